@@ -18,7 +18,7 @@ _build = armkin.model.build_arm.arm_of_file
 _arms: dict[tuple[str, str], Arm] = {}
 
 
-def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
+def build_once(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
     """`armkin.model.build_arm.arm_of_file`, once for each robot file."""
     if scene is not None or tool is not None:
         return _build(file, scene, tool)
@@ -35,5 +35,5 @@ def build(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | N
 
 def install() -> None:
     """For all tests of this process."""
-    armkin.model.build_arm.arm_of_file = build
-    armkin.keep_out.load_with_scene.arm_of_file = build  # type: ignore[attr-defined]
+    armkin.model.build_arm.arm_of_file = build_once
+    armkin.keep_out.load_with_scene.arm_of_file = build_once  # type: ignore[attr-defined]

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 
-from distribution import Distribution, mixed
+from distribution import Distribution, mix_order
 from slow import SLOW
 
 # Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
@@ -111,7 +111,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason=_NO_COMPILER))
     if "PYTEST_XDIST_WORKER" in os.environ:
         slow = [item for item in items if _is_slow(item)]
-        items[:] = mixed(slow, [item for item in items if not _is_slow(item)])
+        items[:] = mix_order(slow, [item for item in items if not _is_slow(item)])
 
 
 def pytest_collection_finish() -> None:

@@ -20,7 +20,7 @@ _SHARED = re.compile(rf"^(?:from|import) (?:{_HELPERS})\b", re.MULTILINE)
 
 
 @cache
-def together(path: Path) -> str | None:
+def sharing_group(path: Path) -> str | None:
     """The name of those tests, this file's among them, that one worker has all of: all in a browser, or a file's."""
     text = path.read_text("utf-8")
     if _BROWSER.search(text):
@@ -32,10 +32,10 @@ class Distribution(LoadScopeScheduling):  # type: ignore[misc]  # xdist has no t
     """To a worker that is free goes the next test, or the next tests that stay together."""
 
     def _split_scope(self, nodeid: str) -> str:
-        return together(_ROOT / nodeid.split("::", 1)[0]) or nodeid
+        return sharing_group(_ROOT / nodeid.split("::", 1)[0]) or nodeid
 
 
-def mixed(slow: list[pytest.Item], quick: list[pytest.Item]) -> list[pytest.Item]:
+def mix_order(slow: list[pytest.Item], quick: list[pytest.Item]) -> list[pytest.Item]:
     """The order in which tests are given away: long ones first, so that all workers end together.
 
     Those in a browser begin: they take longest. Between tests that compute stand, evenly, the files whose tests stay
@@ -43,10 +43,10 @@ def mixed(slow: list[pytest.Item], quick: list[pytest.Item]) -> list[pytest.Item
     """
     groups: dict[str, list[pytest.Item]] = {"browser": []}
     for item in slow + quick:
-        if name := together(item.path):
+        if name := sharing_group(item.path):
             groups.setdefault(name, []).append(item)
-    alone = [item for item in slow if not together(item.path)]
+    alone = [item for item in slow if not sharing_group(item.path)]
     order: list[pytest.Item] = []
     for number, group in enumerate(groups.values()):
         order += group + alone[number :: len(groups)]
-    return order + [item for item in quick if not together(item.path)]
+    return order + [item for item in quick if not sharing_group(item.path)]

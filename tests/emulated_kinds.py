@@ -21,13 +21,13 @@ from other_programs import GRBL, OURS
 from starting_elsewhere import KINDS
 
 
-def ours(board: Board, sim: Any) -> Emulated:
+def emulate_ours(board: Board, sim: Any) -> Emulated:
     axes = configure(board.arm).axes
     foreign = [partial(sim.write, data) for data in OURS]
     return Emulated(board, sim, lambda: [sim.board.net[axis] for axis in axes], reset=sim.board.reset, foreign=foreign)
 
 
-def grbl(board: Board, sim: Any, hal: bool = False) -> Emulated:
+def emulate_grbl(board: Board, sim: Any, hal: bool = False) -> Emulated:
     sim.step = 0.01
     if hal:
         sim.__init__(axes=sim.axes, settings={**sim.settings, 384: 1}, hal=True)
@@ -49,11 +49,11 @@ def grbl(board: Board, sim: Any, hal: bool = False) -> Emulated:
     )
 
 
-def grblhal(board: Board, sim: Any) -> Emulated:
-    return grbl(board, sim, hal=True)
+def emulate_grblhal(board: Board, sim: Any) -> Emulated:
+    return emulate_grbl(board, sim, hal=True)
 
 
-def klipper(board: Board, sim: Any) -> Emulated:
+def emulate_klipper(board: Board, sim: Any) -> Emulated:
     axes = axes_of(board.arm)
     sim.step = 0.01
 
@@ -70,7 +70,7 @@ def klipper(board: Board, sim: Any) -> Emulated:
     )
 
 
-def feetech(board: Board, sim: Any) -> Emulated:
+def emulate_feetech(board: Board, sim: Any) -> Emulated:
     for k, count in enumerate(armkin.pulses(board.arm, board.arm.home), 1):
         sim.servos[k] = Servo(k, count)
 
@@ -95,7 +95,7 @@ def feetech(board: Board, sim: Any) -> Emulated:
     )
 
 
-def dynamixel(board: Board, sim: Any) -> Emulated:
+def emulate_dynamixel(board: Board, sim: Any) -> Emulated:
     """Of the kind of examples/board_plugin, which must be installed."""
     torque, goal = slice(64, 65), slice(116, 120)
 
@@ -122,11 +122,11 @@ def dynamixel(board: Board, sim: Any) -> Emulated:
 
 
 EMULATED: dict[str, tuple[str, Callable[..., Emulated]]] = {
-    "uno_cnc_shield": ("uno_cnc_shield", ours),
-    "grbl": ("grbl", grbl),
-    "grblHAL": ("grbl", grblhal),
-    "klipper": ("klipper", klipper),
-    "feetech": ("feetech", feetech),
+    "uno_cnc_shield": ("uno_cnc_shield", emulate_ours),
+    "grbl": ("grbl", emulate_grbl),
+    "grblHAL": ("grbl", emulate_grblhal),
+    "klipper": ("klipper", emulate_klipper),
+    "feetech": ("feetech", emulate_feetech),
 }
 
 
@@ -138,9 +138,9 @@ SAMPLES = {
 }
 
 
-def start(kind: str) -> Start:
+def starter_of(kind: str) -> Start:
     """Begins a fresh emulator of a kind, named in EMULATED or `dynamixel`."""
-    name, emulate = EMULATED.get(kind, ("feetech", dynamixel))
+    name, emulate = EMULATED.get(kind, ("feetech", emulate_dynamixel))
     text = KINDS[name] if kind in EMULATED else KINDS[name].replace(name, kind)
 
     def begin() -> Emulated:
@@ -151,7 +151,7 @@ def start(kind: str) -> Start:
     return begin
 
 
-def sample(case: Callable[..., None], kind: str) -> None:
+def run_sample(case: Callable[..., None], kind: str) -> None:
     """A case, or some of it where all takes long: all of them are `tests/bench/bench_conformance.py`."""
     times = SAMPLES.get(case.__name__)
-    case(start(kind), *[times] * (times is not None))
+    case(starter_of(kind), *[times] * (times is not None))

@@ -307,33 +307,33 @@ def _edits() -> dict[str, tuple[str, str, str]]:
     }
 
 
-def _edited(text: str, before: str, after: str) -> str:
+def _edit_text(text: str, before: str, after: str) -> str:
     assert before in text, before
     return text.replace(before, after) if before == "a: " else text.replace(before, after, 1)
 
 
-def _joints(count: int) -> str:
+def _joint_rows(count: int) -> str:
     head = "name: arm\nconvention: standard\njoints:"
     rows = [f"\n  - {{name: q{i}, dh: {{alpha: 0, a: 10, d: 0}}}}" for i in range(count)]
     return head + ("".join(rows) or " []") + "\n"
 
 
-def _motors(count: int) -> str:
+def _motor_rows(count: int) -> str:
     row = "{{name: M{0}, joints: {{q{0}: 1}}, full_steps: 200, microsteps: 1}}"
     rows = "".join(f"  - {row.format(i)}\n" for i in range(count))
-    return f"{_joints(1)}motors:\n{rows}"
+    return f"{_joint_rows(1)}motors:\n{rows}"
 
 
-def cases() -> dict[str, bytes]:
+def hostile_files() -> dict[str, bytes]:
     """Every hostile file by its name."""
-    texts = {name: _edited(*edit).encode() for name, edit in _edits().items()}
+    texts = {name: _edit_text(*edit).encode() for name, edit in _edits().items()}
     bomb = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         f"{chr(98 + i)}: &{chr(98 + i)} [{', '.join([f'*{chr(97 + i)}'] * 9)}]\n" for i in range(9)
     )
     return texts | {
-        "0 joints": _joints(0).encode(),
-        "13 joints": _joints(13).encode(),
-        "1000 joints": _joints(1000).encode(),
+        "0 joints": _joint_rows(0).encode(),
+        "13 joints": _joint_rows(13).encode(),
+        "1000 joints": _joint_rows(1000).encode(),
         "empty file": b"",
         "blanks": b" \n\n  \n",
         "comments only": b"# name: arm\n",
@@ -341,8 +341,8 @@ def cases() -> dict[str, bytes]:
         "null document": b"--- ~\n",
         "one word": b"arm\n",
         "one number": b"42\n",
-        "25 motors": _motors(25).encode(),
-        "1000 motors": _motors(1000).encode(),
+        "25 motors": _motor_rows(25).encode(),
+        "1000 motors": _motor_rows(1000).encode(),
         "weights of 100 joints": MOTORS.replace(
             "joints: {J3: 1}", f"joints: {{{', '.join(f'J{i}: 1' for i in range(100))}}}"
         ).encode(),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 
-def interrupted(work: Callable[..., Any], number: int) -> Callable[..., Any]:
+def interrupt_at(work: Callable[..., Any], number: int) -> Callable[..., Any]:
     """The same work, which Ctrl-C ends when it is begun for the `number`-th time."""
     begun = 0
 

@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 
-def square(mark: str, chunk: int) -> int:
+def square_or_die(mark: str, chunk: int) -> int:
     """A chunk's square; the third one kills its process, unless a file `mark` says that one has been killed."""
     if chunk == 2 and not Path(mark).exists():
         Path(mark).touch()
@@ -16,7 +16,7 @@ def square(mark: str, chunk: int) -> int:
     return chunk * chunk
 
 
-def waiting(_: str, chunk: int) -> int:
+def wait_for_ever(_: str, chunk: int) -> int:
     """The process that answers; those behind the second chunk last for ever."""
     if chunk > 1:
         time.sleep(3600)

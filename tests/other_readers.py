@@ -15,7 +15,7 @@ _ARC = 2000  # points of an arc or curve
 _MM = 25.4 / 96
 
 
-def gcode(text: str) -> np.ndarray:
+def gcode_points(text: str) -> np.ndarray:
     """All points that the tool passes behind the first one: (N, 3) [mm], arcs as chords."""
     unit, absolute, plane, motion, system = 1.0, True, (0, 1, 2), None, 1
     zero = {k: np.zeros(3) for k in range(1, 7)}
@@ -50,7 +50,7 @@ def gcode(text: str) -> np.ndarray:
             for k, x in axis_values:
                 goal[k] = base[k] + x if absolute or 53 in codes else place[k] + x
             if motion in (2, 3):
-                points += _turned(place, goal, plane, motion == 3, value, unit, bool(points))
+                points += _arc_points(place, goal, plane, motion == 3, value, unit, bool(points))
             else:
                 points.append(goal)
             place = goal
@@ -59,7 +59,7 @@ def gcode(text: str) -> np.ndarray:
     return np.array(points)
 
 
-def _turned(
+def _arc_points(
     a: np.ndarray, b: np.ndarray, plane: tuple[int, int, int], left: bool, value: dict[str, float], unit: float,
     drawn: bool,
 ) -> list[np.ndarray]:  # fmt: skip
@@ -83,7 +83,7 @@ def _turned(
     return list(points)
 
 
-def svg(text: str) -> list[np.ndarray]:
+def svg_strokes(text: str) -> list[np.ndarray]:
     """The strokes of a drawing, (N, 2) [mm] each, zero at the viewBox's lower left corner and y up."""
     root = ElementTree.fromstring(text)
     box = [float(x) for x in root.get("viewBox", "0 0 100 100").split()]
@@ -93,26 +93,28 @@ def svg(text: str) -> list[np.ndarray]:
     k = size / box[2]
     frame = np.array([[k, 0, -k * box[0]], [0, -k, k * (box[1] + box[3])], [0, 0, 1.0]])
     ids = {e.get("id"): e for e in root.iter() if e.get("id")}
-    return [s for child in root for s in _element(child, frame, ids)]
+    return [s for child in root for s in _element_strokes(child, frame, ids)]
 
 
-def _element(e: ElementTree.Element, frame: np.ndarray, ids: dict[str | None, ElementTree.Element]) -> list[np.ndarray]:
+def _element_strokes(
+    e: ElementTree.Element, frame: np.ndarray, ids: dict[str | None, ElementTree.Element]
+) -> list[np.ndarray]:
     tag = e.tag.split("}")[-1]
     for name, inside in re.findall(r"(\w+)\s*\(([^)]*)\)", e.get("transform", "")):
-        frame = frame @ _matrix(name, [float(x) for x in re.split(r"[\s,]+", inside.strip())])
+        frame = frame @ _transform_matrix(name, [float(x) for x in re.split(r"[\s,]+", inside.strip())])
     if tag == "g":
-        return [s for child in e for s in _element(child, frame, ids)]
+        return [s for child in e for s in _element_strokes(child, frame, ids)]
     if tag == "use":
-        moved = frame @ _matrix("translate", [float(e.get("x", 0)), float(e.get("y", 0))])
+        moved = frame @ _transform_matrix("translate", [float(e.get("x", 0)), float(e.get("y", 0))])
         href = e.get("href") or e.get("{http://www.w3.org/1999/xlink}href") or ""
-        return _element(ids[href[1:]], moved, ids)
+        return _element_strokes(ids[href[1:]], moved, ids)
     if tag == "defs":
         return []
     n = {key: float(x) for key, x in e.items() if re.fullmatch(r"-?[\d.]+(e-?\d+)?", x)}
     t = np.exp(2j * np.pi * np.linspace(0.0, 1.0, _ARC))
     strokes: list[np.ndarray] = []
     if tag == "path":
-        strokes = _path(e.get("d", ""))
+        strokes = _subpaths(e.get("d", ""))
     elif tag == "line":
         strokes = [np.array([complex(n.get("x1", 0), n.get("y1", 0)), complex(n.get("x2", 0), n.get("y2", 0))])]
     elif tag in ("polyline", "polygon"):
@@ -128,7 +130,7 @@ def _element(e: ElementTree.Element, frame: np.ndarray, ids: dict[str | None, El
     return [(np.stack([z.real, z.imag, np.ones(len(z))], axis=1) @ frame.T)[:, :2] for z in strokes]
 
 
-def _matrix(name: str, v: list[float]) -> np.ndarray:
+def _transform_matrix(name: str, v: list[float]) -> np.ndarray:
     c, s = np.cos(np.deg2rad(v[0])), np.sin(np.deg2rad(v[0]))
     if name == "translate":
         return np.array([[1, 0, v[0]], [0, 1, v[1] if len(v) > 1 else 0], [0, 0, 1]])
@@ -137,14 +139,14 @@ def _matrix(name: str, v: list[float]) -> np.ndarray:
     if name == "rotate":
         x, y = v[1:] or (0.0, 0.0)
         turned = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-        return np.asarray(_matrix("translate", [x, y]) @ turned @ _matrix("translate", [-x, -y]))
+        return np.asarray(_transform_matrix("translate", [x, y]) @ turned @ _transform_matrix("translate", [-x, -y]))
     if name == "skewX":
         return np.array([[1, s / c, 0], [0, 1, 0], [0, 0, 1]])
     a, b, cc, d, e, f = v
     return np.array([[a, cc, e], [b, d, f], [0, 0, 1]])
 
 
-def _path(d: str) -> list[np.ndarray]:
+def _subpaths(d: str) -> list[np.ndarray]:
     """Subpaths of path data as complex numbers; flags of arcs stand apart."""
     tokens = re.findall(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?", d)
     strokes: list[list[complex]] = []
@@ -168,7 +170,7 @@ def _path(d: str) -> list[np.ndarray]:
             point = z[0] if kind == "L" else (
                 complex(base.real + v[0], point.imag) if kind == "H" else complex(point.real, base.imag + v[0])
             )  # fmt: skip
-            _stroke(strokes, begin, before).append(point)
+            _current_stroke(strokes, begin, before).append(point)
         elif kind in "CSQT":
             cubic = kind in "CS"
             first = (
@@ -178,23 +180,23 @@ def _path(d: str) -> list[np.ndarray]:
             b: list[Any] = [point, first, last, z[-1]] if cubic else [point, first, z[-1]]
             for k in range(len(b) - 1, 0, -1):  # de Casteljau
                 b = [b[j] + f * (b[j + 1] - b[j]) for j in range(k)]
-            _stroke(strokes, begin, before).extend(b[0])
+            _current_stroke(strokes, begin, before).extend(b[0])
             point = z[-1]
         elif kind == "A":
             end = base + complex(v[5], v[6])
-            _stroke(strokes, begin, before).extend(_ellipse(point, end, v, f))
+            _current_stroke(strokes, begin, before).extend(_ellipse_points(point, end, v, f))
             point = end
         before = kind
     return [np.array(s) for s in strokes if np.ptp(np.array(s).real) + np.ptp(np.array(s).imag) > 0]  # dots are none
 
 
-def _stroke(strokes: list[list[complex]], begin: complex, before: str) -> list[complex]:
+def _current_stroke(strokes: list[list[complex]], begin: complex, before: str) -> list[complex]:
     if before == "Z":
         strokes.append([begin])
     return strokes[-1]
 
 
-def _ellipse(a: complex, b: complex, v: list[float], f: np.ndarray) -> np.ndarray:
+def _ellipse_points(a: complex, b: complex, v: list[float], f: np.ndarray) -> np.ndarray:
     """In the frame where the ellipse is a unit circle: both circles through the ends, then the flags choose."""
     rx, ry, tilt, large, sweep = v[0], v[1], np.exp(1j * np.deg2rad(v[2])), v[3], v[4]
 
@@ -205,7 +207,7 @@ def _ellipse(a: complex, b: complex, v: list[float], f: np.ndarray) -> np.ndarra
     p, q = unit(a), unit(b)
     half = abs(q - p) / 2
     if half > 1:  # too small: grown until it fits
-        return _ellipse(a, b, [rx * half * (1 + 1e-12), ry * half * (1 + 1e-12), *v[2:]], f)
+        return _ellipse_points(a, b, [rx * half * (1 + 1e-12), ry * half * (1 + 1e-12), *v[2:]], f)
     away = np.sqrt(1 - half**2) * (q - p) / abs(q - p) * 1j
     for centre in ((p + q) / 2 + away, (p + q) / 2 - away):
         turn = np.angle((q - centre) / (p - centre)) % (2 * np.pi)

@@ -31,6 +31,6 @@ class Person:
         return lambda: next(looks, None) is not None
 
 
-def seen(answer: str) -> list[str]:
+def keys_for_direction(answer: str) -> list[str]:
     """A joint is moved, and what was seen is said."""
     return ["+", ENTER, answer]

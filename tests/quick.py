@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 
 
-def least(work: Callable[[], object], bound: float, clock: Callable[[], float] = time.process_time) -> float:
+def least_seconds(work: Callable[[], object], bound: float, clock: Callable[[], float] = time.process_time) -> float:
     """Least seconds of a piece of work, which is done again, at most five times in all, while it takes a bound or more.
 
     On a virtual machine that others keep busy even processor seconds are longer than they were on an idle one.

@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 _load = toolchain.load_library
 
 
-def load(source: str, content: str, level: int = 3) -> ctypes.CDLL:
+def load_unoptimised(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """`toolchain.load_library`, whatever the level not optimised."""
     return _load(source, content, 0)
 
 
 def install() -> None:
     """For all tests of this process."""
-    toolchain.load_library = load
+    toolchain.load_library = load_unoptimised
 
 
 @lru_cache(maxsize=16)
-def _optimised(arm: Arm) -> CompiledArm:
+def _compile_optimised(arm: Arm) -> CompiledArm:
     from armkin.compiled.compiled_arm import CompiledArm
 
     return CompiledArm(arm)
@@ -44,10 +44,10 @@ def optimised(monkeypatch: pytest.MonkeyPatch) -> None:
     import armkin.compiled.compiled_arm
 
     monkeypatch.setattr(toolchain, "load_library", _load)
-    monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled_arm", _optimised)
+    monkeypatch.setattr(armkin.compiled.compiled_arm, "_compiled_arm", _compile_optimised)
 
 
 @pytest.fixture
 def quickly(optimised: None, monkeypatch: pytest.MonkeyPatch) -> None:
     """Among tests of `armkin.compile` as users have it: an arm of a class of which another one is optimised."""
-    monkeypatch.setattr(toolchain, "load_library", load)
+    monkeypatch.setattr(toolchain, "load_library", load_unoptimised)

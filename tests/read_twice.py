@@ -13,20 +13,20 @@ from armkin.path_file.drawing import DrawingOptions, Placing
 AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def along(points: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, float]:
+def points_along(points: np.ndarray, f: np.ndarray) -> tuple[np.ndarray, float]:
     """Points at shares of a polyline's length, and the length."""
     u = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     return np.stack([np.interp(f * u[-1], u, points[:, k]) for k in range(points.shape[1])], axis=1), float(u[-1])
 
 
-def apart(a: np.ndarray, b: np.ndarray) -> float:
+def greatest_distance(a: np.ndarray, b: np.ndarray) -> float:
     """Greatest distance of two ways, each point from the other way's segments about the same share of its length."""
     f = np.linspace(0.0, 1.0, 4001)
-    (p, long), (q, other_length) = along(a, f), along(b, f)
-    return max(_off(p, q), _off(q, p), abs(long - other_length) / 50 - 0.01)
+    (p, long), (q, other_length) = points_along(a, f), points_along(b, f)
+    return max(_distance_from(p, q), _distance_from(q, p), abs(long - other_length) / 50 - 0.01)
 
 
-def _off(p: np.ndarray, q: np.ndarray) -> float:
+def _distance_from(p: np.ndarray, q: np.ndarray) -> float:
     least = np.full(len(p), np.inf)
     for shift in range(-4, 4):
         i = np.clip(np.arange(len(p)) + shift, 0, len(q) - 2)
@@ -45,7 +45,7 @@ def program_read(text: str) -> np.ndarray:
             points.append(np.array(move.point))
         points += [np.array(p) for p in move.polyline or []]
         if move.arc is not None:
-            points += list(_through(points[-1], np.array(move.arc.via), np.array(move.arc.to)))
+            points += list(_arc_through(points[-1], np.array(move.arc.via), np.array(move.arc.to)))
         if move.circle is not None:
             c, n = np.array(move.circle.centre), np.array(move.circle.normal)
             r, turn = points[-1] - c, 2 * np.pi * move.circle.turns
@@ -55,7 +55,7 @@ def program_read(text: str) -> np.ndarray:
     return np.array(points)
 
 
-def _through(a: np.ndarray, via: np.ndarray, b: np.ndarray) -> np.ndarray:
+def _arc_through(a: np.ndarray, via: np.ndarray, b: np.ndarray) -> np.ndarray:
     """An arc of three points: (N, 3)."""
     u, v = via - a, b - a
     w = np.cross(u, v)
@@ -71,25 +71,25 @@ def _through(a: np.ndarray, via: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def program_off(seed: int) -> float:
     """How far a program's way lies off the other reader's [mm]."""
-    text = random_drawings.program(seed)
-    return apart(program_read(text), other_readers.gcode(text))
+    text = random_drawings.random_program(seed)
+    return greatest_distance(program_read(text), other_readers.gcode_points(text))
 
 
 def drawing_off(seed: int) -> float:
     """How far a drawing's strokes lie off the other reader's [mm]."""
-    text = random_drawings.drawing(seed)
+    text = random_drawings.random_drawing(seed)
     strokes: list[list[list[float]]] = []
     for move in svg.parse_svg(text.encode(), "t.svg", AS_IT_IS, DrawingOptions(lift=0.0)).moves:
         if move.point is not None:
             strokes.append([list(move.point)])
         strokes[-1] += [list(p) for p in move.polyline or []]
     mine = np.concatenate([np.array(s)[:, :2] for s in strokes])
-    return apart(mine, np.concatenate(other_readers.svg(text)))
+    return greatest_distance(mine, np.concatenate(other_readers.svg_strokes(text)))
 
 
-def spoilt(seed: int, number: int) -> tuple[str, str, str]:
+def spoil_drawing(seed: int, number: int) -> tuple[str, str, str]:
     """A drawing with a broken element, or a broken line: its text, the place that is named, what is said."""
-    lines, rng = random_drawings.drawing(seed).splitlines(), np.random.default_rng(seed)
+    lines, rng = random_drawings.random_drawing(seed).splitlines(), np.random.default_rng(seed)
     line, words = random_drawings.BROKEN_ELEMENTS[number % len(random_drawings.BROKEN_ELEMENTS)]
     k = int(rng.integers(3, len(lines)))  # behind the head, before the end
     lines.insert(k, line)

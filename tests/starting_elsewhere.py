@@ -70,7 +70,7 @@ class Kind:
         return self.board.machine
 
 
-def _text(board: str, axes: Sequence[str] = "XYZ", drives: Sequence[str] = (), gripper: bool = True) -> str:
+def _robot_text(board: str, axes: Sequence[str] = "XYZ", drives: Sequence[str] = (), gripper: bool = True) -> str:
     """three_dof's file with another board, other axes or drives."""
     document = yaml.safe_load((ROOT / "robots/three_dof.yaml").read_text())
     document["board"] = yaml.safe_load(board)
@@ -90,17 +90,17 @@ SERVOS = [f"{{kind: servo, axis: S{k}, travel: [0, 180], pulse_us: [500, 2500], 
           for k, zero in enumerate((90, 40, 150))]  # fmt: skip
 BUS = [f"{{kind: bus, id: {k}, counts: 4096, zero: 2048}}" for k in (1, 2, 3)]
 KINDS = {
-    "uno_cnc_shield": _text("{kind: uno_cnc_shield, driver: A4988}"),
-    "mega_ramps14": _text("{kind: mega_ramps14, driver: A4988}"),
-    "pico6": _text("{kind: pico6, driver: A4988}"),
-    "uno_servos": _text("{kind: uno_servos}", drives=SERVOS),
-    "grbl": _text("{kind: grbl}", gripper=False),
-    "klipper": _text("{kind: klipper}", "ABC", gripper=False),
-    "feetech": _text("{kind: feetech}", drives=BUS, gripper=False),
+    "uno_cnc_shield": _robot_text("{kind: uno_cnc_shield, driver: A4988}"),
+    "mega_ramps14": _robot_text("{kind: mega_ramps14, driver: A4988}"),
+    "pico6": _robot_text("{kind: pico6, driver: A4988}"),
+    "uno_servos": _robot_text("{kind: uno_servos}", drives=SERVOS),
+    "grbl": _robot_text("{kind: grbl}", gripper=False),
+    "klipper": _robot_text("{kind: klipper}", "ABC", gripper=False),
+    "feetech": _robot_text("{kind: feetech}", drives=BUS, gripper=False),
 }
 
 
-def on(kind: str, at: Array | None = None) -> Kind:
+def simulated_kind(kind: str, at: Array | None = None) -> Kind:
     """three_dof on a simulated board of that kind, at home or at joint values (n,) [rad]."""
     arm = arm_of_file(parse_robot_file(KINDS[kind]))
     seen: list[list[float]] = []
@@ -109,7 +109,7 @@ def on(kind: str, at: Array | None = None) -> Kind:
     if kind == "feetech":
         for k, count in enumerate(armkin.pulses(arm, arm.home if at is None else at), 1):
             port.servos[k] = Servo(k, count)
-    watch(arm, kind, port, seen)
+    watch_counts(arm, kind, port, seen)
     machine = board.connect(port)
     machine.prepare(assume=None if kind == "feetech" else at)
 
@@ -123,7 +123,7 @@ def on(kind: str, at: Array | None = None) -> Kind:
     return Kind(arm, board, pins, tolerance, 12 if kind == "feetech" else 0, kind in BOARDS)
 
 
-def watch(arm: armkin.Arm, kind: str, port: Any, seen: list[list[float]]) -> None:
+def watch_counts(arm: armkin.Arm, kind: str, port: Any, seen: list[list[float]]) -> None:
     """Note what the motors of a simulated board have counted whenever its time has passed."""
     sim = port
     if kind in BOARDS:
@@ -177,10 +177,10 @@ def carried_out(kind: Kind, moves: dict[str, Any], place: Sequence[float]) -> Re
     laid = path_run.lay_parts(plan, machine.counts(), machine.lay)
     kind.pins()
     path_run.follow_plan(kind.board, plan, laid, lambda done, total: None)
-    return judged(plan, np.array([*kind.pins(), list(machine.counts())], dtype=float))
+    return judge_motion(plan, np.array([*kind.pins(), list(machine.counts())], dtype=float))
 
 
-def judged(plan: armkin.PathPlan, counts: Array) -> Result:
+def judge_motion(plan: armkin.PathPlan, counts: Array) -> Result:
     """Counts (N, motors) of a motion against its plan."""
     arm = plan.arm
     moved = counts[np.append(True, (np.diff(counts, axis=0) != 0).any(axis=1))]
@@ -191,11 +191,13 @@ def judged(plan: armkin.PathPlan, counts: Array) -> Result:
     # of every step: the arm rests at the path's start for one row of them
     begins = float(np.linalg.norm(armkin.fk(arm, armkin.joints(arm, moved))[:, :3, 3] - first, axis=1).min())
     return Result(
-        float(distance(tips, way).max()), begins, int(np.abs(counts[-1] - armkin.pulses(arm, plan.motion.end)).max())
+        float(polyline_distance(tips, way).max()),
+        begins,
+        int(np.abs(counts[-1] - armkin.pulses(arm, plan.motion.end)).max()),
     )
 
 
-def distance(tips: Array, way: Array) -> Array:
+def polyline_distance(tips: Array, way: Array) -> Array:
     """Distance of points (N, 3) from a polyline (M, 3): (N,)."""
     found = np.full(len(tips), np.inf)
     near = np.array([((way - p) ** 2).sum(axis=1).argmin() for p in tips])

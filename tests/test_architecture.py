@@ -100,17 +100,17 @@ MODULES = {
 
 
 @cache
-def _parsed(path: Path) -> ast.Module:
+def _syntax_tree(path: Path) -> ast.Module:
     return ast.parse(path.read_text())
 
 
 @cache
-def _nodes(path: Path) -> list[ast.AST]:
+def _tree_nodes(path: Path) -> list[ast.AST]:
     """All nodes of a file's syntax tree."""
-    return list(ast.walk(_parsed(path)))
+    return list(ast.walk(_syntax_tree(path)))
 
 
-def _room(module: str) -> str:
+def _room_of(module: str) -> str:
     """The room of ``armkin.inverse.closed.elbow`` is ``inverse/closed``."""
     path = MODULES[module]
     folder = path.parent.relative_to(SOURCE / "armkin").as_posix()
@@ -119,13 +119,13 @@ def _room(module: str) -> str:
 
 
 @cache
-def _imports(module: str) -> list[str]:
+def _imports_of(module: str) -> list[str]:
     """Modules of armkin that a module imports, anywhere in it: for types and inside functions, too."""
-    return sorted({*_imported(module)} - {"armkin"})
+    return sorted({*_imported_modules(module)} - {"armkin"})
 
 
-def _imported(module: str) -> Iterator[str]:
-    for node in _nodes(MODULES[module]):
+def _imported_modules(module: str) -> Iterator[str]:
+    for node in _tree_nodes(MODULES[module]):
         if isinstance(node, ast.Import):
             yield from (name.name for name in node.names if name.name in MODULES and name.name != "armkin")
         elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
@@ -134,12 +134,12 @@ def _imported(module: str) -> Iterator[str]:
                 yield inner if inner in MODULES else str(node.module)
 
 
-@pytest.mark.parametrize("module", [module for module in MODULES if _room(module) not in TOP])
+@pytest.mark.parametrize("module", [module for module in MODULES if _room_of(module) not in TOP])
 def test_a_room_imports_what_stands_above_it(module: str) -> None:
-    room = _room(module)
+    room = _room_of(module)
     assert room in MAY_IMPORT, f"{room} is a new room: give it a row in MAY_IMPORT"
     allowed = {room, *MAY_IMPORT[room].split()}
-    wrong = {imported: _room(imported) for imported in _imports(module) if _room(imported) not in allowed}
+    wrong = {imported: _room_of(imported) for imported in _imports_of(module) if _room_of(imported) not in allowed}
     assert not wrong
 
 
@@ -149,28 +149,28 @@ def test_below_the_model_nothing_reads_the_robot_file() -> None:
     readers = {
         module
         for module, path in MODULES.items()
-        for node in _nodes(path)
+        for node in _tree_nodes(path)
         if isinstance(node, ast.Attribute) and node.attr == "file" and ast.unparse(node.value).endswith("arm")
     }
-    assert not {module for module in readers if _room(module) not in printing}
+    assert not {module for module in readers if _room_of(module) not in printing}
 
 
 def test_no_row_of_the_table_contradicts_another() -> None:
     rows = {room: above.split() for room, above in MAY_IMPORT.items()}
     assert not {up for above in rows.values() for up in above} - rows.keys(), "a room without a row"
-    assert _circle(rows) is None
+    assert _find_circle(rows) is None
 
 
 def test_no_module_imports_itself_by_way_of_others() -> None:
-    assert _circle({module: _imports(module) for module in MODULES}) is None
+    assert _find_circle({module: _imports_of(module) for module in MODULES}) is None
 
 
 def test_a_circle_is_found() -> None:
-    assert _circle({"a": ["b"], "b": ["c"], "c": []}) is None
-    assert _circle({"a": ["b"], "b": ["c"], "c": ["b"]}) == "b -> c -> b"
+    assert _find_circle({"a": ["b"], "b": ["c"], "c": []}) is None
+    assert _find_circle({"a": ["b"], "b": ["c"], "c": ["b"]}) == "b -> c -> b"
 
 
-def _circle(graph: Mapping[str, Sequence[str]]) -> str | None:
+def _find_circle(graph: Mapping[str, Sequence[str]]) -> str | None:
     """A way along the arrows that comes back to where it began; None if there is none."""
     done: set[str] = set()
 
@@ -206,7 +206,7 @@ def test_classes_have_at_most_250_lines() -> None:
     long = {
         node.name
         for path in MODULES.values()
-        for node in _nodes(path)
+        for node in _tree_nodes(path)
         if isinstance(node, ast.ClassDef) and (node.end_lineno or 0) - node.lineno >= 250
     }
     assert not long
@@ -221,8 +221,8 @@ def test_functions_have_at_most_60_lines() -> None:
         f"{module}.{node.name}"
         for module, path in MODULES.items()
         if not module.startswith("armkin.cli.")
-        for node in _nodes(path)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and _lines(module, node) > 60
+        for node in _tree_nodes(path)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and _line_count(module, node) > 60
     }
     assert not long
 
@@ -235,8 +235,8 @@ def test_functions_have_at_most_15_branches() -> None:
     branched = {
         f"{module}.{node.name}"
         for module, path in MODULES.items()
-        for node in _nodes(path)
-        if isinstance(node, ast.FunctionDef) and _branches(node) > 15
+        for node in _tree_nodes(path)
+        if isinstance(node, ast.FunctionDef) and _branch_count(node) > 15
         if "noqa: C901" not in path.read_text("utf-8").splitlines()[node.lineno - 1]
     }
     assert not branched
@@ -245,7 +245,7 @@ def test_functions_have_at_most_15_branches() -> None:
 BRANCHES = {ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case}
 
 
-def _branches(function: ast.FunctionDef) -> int:
+def _branch_count(function: ast.FunctionDef) -> int:
     """Ways through a function, one more than its decisions; functions in it are counted by themselves."""
     left: list[ast.AST] = [*function.body]
     count = 1
@@ -264,10 +264,10 @@ def _branches(function: ast.FunctionDef) -> int:
 def test_branches_are_counted_in_full() -> None:
     [node] = ast.parse("def f(x):\n    return [y for y in x if y and (y > 1 or y < 0)] if x else 0").body
     assert isinstance(node, ast.FunctionDef)
-    assert _branches(node) == 6
+    assert _branch_count(node) == 6
 
 
-def _lines(module: str, node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+def _line_count(module: str, node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
     public = module == f"armkin.{armkin._HOME.get(node.name)}"
     docstring = (node.body[0].end_lineno or 0) - node.body[0].lineno + 1 if public else 0
     return (node.end_lineno or 0) - node.lineno + 1 - docstring
@@ -291,7 +291,7 @@ def test_every_class_and_public_function_has_a_docstring() -> None:
     silent = {
         f"{module}.{node.name}"
         for module, path in MODULES.items()
-        for owner in _nodes(path)
+        for owner in _tree_nodes(path)
         if isinstance(owner, ast.Module | ast.ClassDef)
         for node in owner.body
         if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
@@ -316,7 +316,7 @@ LISTED_ELSEWHERE = {  # the table of commands in docs/architecture.md; a kind is
 @pytest.mark.parametrize("package", [path for path in PACKAGES if path not in LISTED_ELSEWHERE], ids=lambda p: p.name)
 def test_a_package_lists_its_files(package: Path) -> None:
     """And no other files: every word that ends in .py is one of its own, or has a path before it."""
-    text = ast.get_docstring(_parsed(package / "__init__.py")) or ""
+    text = ast.get_docstring(_syntax_tree(package / "__init__.py")) or ""
     files = {
         f"{path.name}{'/' * path.is_dir()}" for path in package.iterdir() if path.suffix == ".py" or _is_room(path)
     }
@@ -336,14 +336,14 @@ def test_outside_board_nobody_knows_a_kind() -> None:
     }
     found = []
     for module in (name for name in MODULES if not name.startswith("armkin.board.")):
-        for node in _nodes(MODULES[module]):
+        for node in _tree_nodes(MODULES[module]):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
                 asked = ast.unparse(node.args[1])
                 if any(word in asked for word in ("Machine", "Foreign", "Configuration", "Backend", "FirmwareBoard")):
                     found.append(f"{module}: {ast.unparse(node)}")
         # `stop` ends sessions of our firmware without knowing the arm, and what was flashed is asked what it is
         if module not in ("armkin.cli.commands.stop", "armkin.flash.upload_firmware"):
-            found += [f"{module}: {name}" for name in _imports(module) if name.startswith(tuple(kinds))]
+            found += [f"{module}: {name}" for name in _imports_of(module) if name.startswith(tuple(kinds))]
     assert not found
 
 

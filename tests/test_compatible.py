@@ -33,15 +33,15 @@ def test_every_option(command: str) -> None:
 def test_every_key(words: str) -> None:
     completed = run(*words.split(), "--json")
     assert completed.code == BEFORE["json"][words]["exit_code"]
-    assert set(BEFORE["json"][words]["keys"]) <= _keys(completed.json)
+    assert set(BEFORE["json"][words]["keys"]) <= _key_paths(completed.json)
 
 
-def _keys(value: Any, place: str = "") -> set[str]:
+def _key_paths(value: Any, place: str = "") -> set[str]:
     """Names of all keys, with the way to them: ``branches.[]joints``."""
     if isinstance(value, dict):
-        inner = [{place + key} | _keys(part, f"{place}{key}.") for key, part in value.items()]
+        inner = [{place + key} | _key_paths(part, f"{place}{key}.") for key, part in value.items()]
     elif isinstance(value, list):
-        inner = [_keys(part, f"{place}[]") for part in value]
+        inner = [_key_paths(part, f"{place}[]") for part in value]
     else:
         return set()
     return set().union(*inner)

@@ -45,11 +45,11 @@ def test_links_between_pages_lead_somewhere() -> None:
 
 def test_the_solvers_table_has_every_class_in_its_order() -> None:
     files = re.findall(r"\| `(inverse/[a-z_/]+)\.py` \|", SOLVER.read_text())
-    order = [_module(function) for function in recognise._CLASSES]
+    order = [_module_of(function) for function in recognise._CLASSES]
     assert [{"inverse/elimination/method": "inverse/solvers/general"}.get(name, name) for name in files] == order
 
 
-def _module(function: object) -> str:
+def _module_of(function: object) -> str:
     name = str(getattr(function, "__module__", "")).removeprefix("armkin.").replace(".", "/")
     return "inverse/solvers/tool_axis" if name == "inverse/solvers/recognise" else name
 

@@ -24,10 +24,10 @@ UNIT = re.compile(r"\[[^]]+\]")
 ARRAYS = ("ArrayLike", "Array", "NDArray", "Joints", "Points", "Poses", "Frames", "Jacobians", "Figures", "Pulses")
 
 
-def _public() -> Iterator[tuple[str, Any]]:
+def _public_callables() -> Iterator[tuple[str, Any]]:
     """Every exported callable, the classes of results, and of classes what they define in public."""
     exported = {name: getattr(armkin, name) for name in armkin.__all__}
-    for name, value in {**exported, **{kind.__name__: kind for kind in _results(exported.values())}}.items():
+    for name, value in {**exported, **{kind.__name__: kind for kind in _result_classes(exported.values())}}.items():
         if callable(value):
             yield name, value
         if inspect.isclass(value):
@@ -36,7 +36,7 @@ def _public() -> Iterator[tuple[str, Any]]:
                     yield f"{name}.{inner}", member
 
 
-def _results(functions: Iterable[Any]) -> Iterator[Any]:
+def _result_classes(functions: Iterable[Any]) -> Iterator[Any]:
     """The dataclasses that functions return."""
     for function in filter(inspect.isfunction, functions):
         named = re.findall(r"\w+", inspect.signature(function).return_annotation)
@@ -47,22 +47,22 @@ def _is_property(member: Any) -> bool:
     return isinstance(member, property | cached_property)
 
 
-PUBLIC = dict(_public())
+PUBLIC = dict(_public_callables())
 FUNCTIONS = {name: value for name, value in PUBLIC.items() if inspect.isfunction(value)}
 READ = {name: value for name, value in PUBLIC.items() if _is_property(value)}
 CLASSES = {name: value for name, value in PUBLIC.items() if inspect.isclass(value)}
 
 
-def _sections(of: Any) -> dict[str, str]:
+def _section_texts(of: Any) -> dict[str, str]:
     text = (inspect.getdoc(of) or "") + "\n"
     return dict(SECTION.findall(text))
 
 
-def _entries(of: Any, section: str) -> dict[str, str]:
-    return {name: " ".join(text.split()) for name, text in ENTRY.findall(_sections(of).get(section, ""))}
+def _section_entries(of: Any, section: str) -> dict[str, str]:
+    return {name: " ".join(text.split()) for name, text in ENTRY.findall(_section_texts(of).get(section, ""))}
 
 
-def _parameters(of: Callable[..., Any]) -> list[str]:
+def _parameter_names(of: Callable[..., Any]) -> list[str]:
     return [name for name in inspect.signature(of).parameters if name != "self"]
 
 
@@ -90,8 +90,8 @@ def test_the_first_line_is_a_sentence_by_itself(name: str) -> None:
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_parameter_has_a_line(name: str) -> None:
-    told = _entries(FUNCTIONS[name], "Args")
-    assert list(told) == _parameters(FUNCTIONS[name])
+    told = _section_entries(FUNCTIONS[name], "Args")
+    assert list(told) == _parameter_names(FUNCTIONS[name])
     parameters = inspect.signature(FUNCTIONS[name]).parameters
     assert not {given for given, text in told.items() if not _has_shape_and_unit(parameters[given].annotation, text)}
 
@@ -99,14 +99,14 @@ def test_every_parameter_has_a_line(name: str) -> None:
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_what_is_returned_is_told(name: str) -> None:
     annotation = inspect.signature(FUNCTIONS[name]).return_annotation
-    told = " ".join(_sections(FUNCTIONS[name]).get("Returns", "").split())
+    told = " ".join(_section_texts(FUNCTIONS[name]).get("Returns", "").split())
     assert bool(told) == (annotation != "None")
     assert _has_shape_and_unit(annotation, told)
 
 
 @pytest.mark.parametrize("name", [name for name in FUNCTIONS if "." not in name])
 def test_what_is_raised_is_told(name: str) -> None:
-    told = _entries(FUNCTIONS[name], "Raises")
+    told = _section_entries(FUNCTIONS[name], "Raises")
     assert told
     assert all(issubclass(getattr(errors, error), armkin.ArmkinError) for error in told)
 
@@ -126,9 +126,9 @@ def test_every_field_has_a_line(name: str) -> None:
     elif issubclass(kind, enum.Enum):
         told = [(member, "") for member in kind.__members__]
     else:
-        assert list(_entries(kind, "Args")) == (_parameters(kind) if "__init__" in vars(kind) else [])
+        assert list(_section_entries(kind, "Args")) == (_parameter_names(kind) if "__init__" in vars(kind) else [])
         return
-    lines = _entries(kind, "Attributes")
+    lines = _section_entries(kind, "Attributes")
     assert list(lines) == [field for field, _ in told]
     assert not {field for field, type_ in told if not _has_shape_and_unit(type_, lines[field])}
 
@@ -139,5 +139,9 @@ def test_the_reference_has_a_row_for_every_parameter_and_field() -> None:
     text = dict(zip(heads[1::2], heads[2::2], strict=True))
     assert text.keys() == PUBLIC.keys()
     for name, member in PUBLIC.items():
-        told = {**_entries(member, "Args"), **_entries(member, "Attributes"), **_entries(member, "Raises")}
+        told = {
+            **_section_entries(member, "Args"),
+            **_section_entries(member, "Attributes"),
+            **_section_entries(member, "Raises"),
+        }
         assert re.findall(r"^\| `\*{0,2}(\w+)` \| ", text[name], re.M) == list(told), name

@@ -14,12 +14,12 @@ BANNED = {"hair": "say how far", "hairs": "say how far", "valley": "say multipli
 ASKED = re.compile(r"\bask(?:s|ed|ing)? (?:an|the) arm\b")
 
 
-def terms() -> list[str]:
+def glossary_terms() -> list[str]:
     return re.findall(r"^- \*\*([^*]+)\*\*: ", GLOSSARY.read_text(), re.M)
 
 
 def test_each_term_is_defined_once_and_in_order() -> None:
-    found = terms()
+    found = glossary_terms()
     assert len(found) > 30
     assert len(found) == len({term.lower() for term in found})
     assert found == sorted(found, key=str.lower)
@@ -30,7 +30,7 @@ def test_each_term_is_defined_once_and_in_order() -> None:
 def test_each_term_is_used() -> None:
     text = "".join(page.read_text().lower() for page in PAGES if page != GLOSSARY)
     code = "".join(path.read_text().lower() for path in (ROOT / "src/armkin").rglob("*.py"))
-    unused = [term for term in terms() if term.lower() not in text and term.lower() not in code]
+    unused = [term for term in glossary_terms() if term.lower() not in text and term.lower() not in code]
     assert not unused
 
 

@@ -34,12 +34,12 @@ SCARA = armkin.load(ROOT / "tests/robots/scara_steppers.yaml")
 STEPPER_ARMS = pytest.mark.parametrize("arm", [THREE_DOF, WRIST, SCARA], ids=lambda arm: arm.name)
 
 
-def degrees(*values: float) -> np.ndarray:
+def in_radians(*values: float) -> np.ndarray:
     return np.deg2rad(values)
 
 
 def test_table_4() -> None:
-    r = rounding(THREE_DOF, degrees(-30, 5, -5))
+    r = rounding(THREE_DOF, in_radians(-30, 5, -5))
     assert r.pulses.tolist() == [-1067, -10144, 5667]
     assert np.rad2deg(r.actual_joints).round(6).tolist() == [-30.009375, 4.998371, -4.995]
     assert r.theoretical.round(4).tolist() == [398.3923, -218.4649, 187.1697]
@@ -121,7 +121,7 @@ def test_there_and_back_within_half_a_pulse(arm: Arm, data: st.DataObject) -> No
 def test_differential_wrist() -> None:
     """Motor 5 = q5 + 2 q6, motor 6 = -q5 + 2 q6, 12800 pulses a turn, home (10, -20)."""
     q = np.zeros(6)
-    q[4:] = degrees(10 + 36, -20 + 18)
+    q[4:] = in_radians(10 + 36, -20 + 18)
     p = dict(zip(motor_names(WRIST), pulses(WRIST, q).tolist(), strict=True))
     assert p == {"M1": 0, "M2a": 0, "M2b": 0, "M3": 0, "M4": 0, "M5": 2560, "M6": 0}
     assert np.rad2deg(joints(WRIST, list(p.values()))).round(9).tolist() == [0, 0, 0, 0, 46, -2]
@@ -131,7 +131,7 @@ def test_differential_wrist() -> None:
 
 def test_two_motors_on_one_shoulder() -> None:
     q = np.zeros(6)
-    q[1] = degrees(1.0)[0]
+    q[1] = in_radians(1.0)[0]
     p = pulses(WRIST, q)
     assert p[1] == p[2] == 267  # invert is wiring: the count is the same
     assert np.rad2deg(resolution(WRIST))[1] == pytest.approx(360 / 96000)
@@ -149,9 +149,9 @@ def servo_arm(invert: bool) -> Arm:
 
 def test_servo_pulse_widths() -> None:
     arm = servo_arm(invert=False)
-    assert pulses(arm, degrees(0, 0)).tolist() == [1500, 1500]
-    assert pulses(arm, degrees(20, 50)).tolist() == [1722, 2056]
-    assert pulses(servo_arm(invert=True), degrees(20, 50)).tolist() == [1722, 944]  # mirrored about zero
+    assert pulses(arm, in_radians(0, 0)).tolist() == [1500, 1500]
+    assert pulses(arm, in_radians(20, 50)).tolist() == [1722, 2056]
+    assert pulses(servo_arm(invert=True), in_radians(20, 50)).tolist() == [1722, 944]  # mirrored about zero
     assert np.rad2deg(resolution(arm)).tolist() == pytest.approx([0.09, 0.09])
     assert pulse_units(arm) == ["us", "us"]
     assert pulse_units(THREE_DOF) == ["step"] * 3
@@ -182,7 +182,7 @@ def test_best_pulses_is_the_best_of_all_neighbours() -> None:
 
 
 def test_best_pulses_of_the_published_pose() -> None:
-    best = best_pulses(THREE_DOF, degrees(-30, 5, -5))
+    best = best_pulses(THREE_DOF, in_radians(-30, 5, -5))
     assert best.rounded.pulses.tolist() == [-1067, -10144, 5667]
     assert best.chosen.pulses.tolist() == [-1067, -10142, 5665]
     assert float(best.gain) == pytest.approx(0.000225829, abs=1e-9)

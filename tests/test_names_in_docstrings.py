@@ -16,7 +16,7 @@ WRITTEN = {"arm.c", "arm_first_pass", "arm_least", "tool_x_mm", "up_axis"}  # of
 
 def test_every_name_in_a_docstring_is_there() -> None:
     trees = {path: ast.parse(path.read_text("utf-8")) for path in (ROOT / "src").rglob("*.py")}
-    there = {name for tree in trees.values() for name in _names(tree)} | OTHERS | WRITTEN
+    there = {name for tree in trees.values() for name in _names_in(tree)} | OTHERS | WRITTEN
     files = {
         path.name for folder in ("src", "docs", "firmware", "scripts", "tests") for path in (ROOT / folder).rglob("*")
     }
@@ -25,20 +25,20 @@ def test_every_name_in_a_docstring_is_there() -> None:
     stale = {
         (path.relative_to(ROOT).as_posix(), quoted)
         for path, tree in trees.items()
-        for docstring in _docstrings(tree)
+        for docstring in _docstrings_of(tree)
         for quoted in re.findall(r"`([\w./]+)`", docstring)
         if not (quoted in there or Path(quoted).name in files or set(re.split(r"[./]", quoted)) <= there)
     }
     assert not {one for one in stale if re.search(r"[A-Za-z_]{2}", one[1])}
 
 
-def _docstrings(tree: ast.Module) -> Iterator[str]:
+def _docstrings_of(tree: ast.Module) -> Iterator[str]:
     for node in ast.walk(tree):
         if isinstance(node, DOCUMENTED):
             yield ast.get_docstring(node, clean=False) or ""
 
 
-def _names(tree: ast.Module) -> Iterator[str]:
+def _names_in(tree: ast.Module) -> Iterator[str]:
     """What code names: variables, attributes, parameters, functions, classes, modules, and words of texts in code."""
     docstrings = {
         id(node.body[0].value)

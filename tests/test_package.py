@@ -27,7 +27,7 @@ LACKS = re.compile(
 ASKED_FIRST = re.compile(r"sys\.platform|hasattr\(|getattr\(|suppress\((?:Import|Except)")
 
 
-def build(what: str, source: Path, folder: Path) -> Path:
+def build_distribution(what: str, source: Path, folder: Path) -> Path:
     """A wheel or an sdist of a source tree."""
     command = [sys.executable, "-m", "hatchling", "build", "-t", what, "-d", str(folder)]
     subprocess.run(command, cwd=source, check=True, capture_output=True)
@@ -37,17 +37,17 @@ def build(what: str, source: Path, folder: Path) -> Path:
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build("wheel", ROOT, tmp_path_factory.mktemp("wheel"))
+    return build_distribution("wheel", ROOT, tmp_path_factory.mktemp("wheel"))
 
 
-def contents(path: Path) -> dict[str, bytes]:
+def wheel_contents(path: Path) -> dict[str, bytes]:
     """Files of a wheel, less the list of their hashes."""
     with zipfile.ZipFile(path) as file:
         return {name: file.read(name) for name in file.namelist() if not name.endswith("RECORD")}
 
 
 def test_the_wheel_holds_the_package_and_the_robots(wheel: Path) -> None:
-    files = contents(wheel)
+    files = wheel_contents(wheel)
     sources = [path.relative_to(SOURCE.parent).as_posix() for path in SOURCE.rglob("*") if path.is_file()]
     missing = {name for name in sources if "__pycache__" not in name} - set(files)
     assert not missing
@@ -57,11 +57,11 @@ def test_the_wheel_holds_the_package_and_the_robots(wheel: Path) -> None:
 
 
 def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
-    sdist = build("sdist", ROOT, tmp_path / "sdist")
+    sdist = build_distribution("sdist", ROOT, tmp_path / "sdist")
     with tarfile.open(sdist) as file:
         file.extractall(tmp_path / "tree", filter="data")
     [tree] = (tmp_path / "tree").iterdir()
-    assert contents(build("wheel", tree, tmp_path / "again")) == contents(wheel)
+    assert wheel_contents(build_distribution("wheel", tree, tmp_path / "again")) == wheel_contents(wheel)
 
 
 @pytest.fixture(scope="module")

@@ -25,31 +25,31 @@ def how(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
 
-def load(robot: str) -> armkin.Arm:
+def load_robot(robot: str) -> armkin.Arm:
     return armkin.load(ROOT / f"robots/{robot}.yaml")
 
 
-def tip(how: str, robot: str, q: Sequence[float]) -> list[float]:
+def tip_position(how: str, robot: str, q: Sequence[float]) -> list[float]:
     """Tip position for joint values in degrees."""
     if how == "cli":
         return list(run("fk", f"robots/{robot}.yaml", *q, "--json").json["position_mm"])
-    return list(armkin.fk(load(robot), np.deg2rad(q))[:3, 3])
+    return list(armkin.fk(load_robot(robot), np.deg2rad(q))[:3, 3])
 
 
 def frame_positions(how: str, robot: str, q: Sequence[float]) -> dict[str, list[float]]:
     if how == "cli":
         answer = run("fk", f"robots/{robot}.yaml", *q, "--frames", "--json").json
         return {frame["name"]: frame["position_mm"] for frame in answer["frames"]}
-    arm = load(robot)
+    arm = load_robot(robot)
     F = armkin.frames(arm, np.deg2rad(q))
     return dict(zip(("base", *arm.joint_names, "tool"), F[:, :3, 3].tolist(), strict=True))
 
 
-def branches(how: str, robot: str, target: Sequence[float]) -> list[dict[str, Any]]:
+def branches_of(how: str, robot: str, target: Sequence[float]) -> list[dict[str, Any]]:
     """All branches [deg], as joints, name and within_limits; angles of the target in degrees."""
     if how == "cli":
         return list(run("ik", f"robots/{robot}.yaml", *target, "--all-branches", "--json").json["branches"])
-    s = armkin.ik(load(robot), [*target[:3], *np.deg2rad(target[3:])] if len(target) > 2 else target)
+    s = armkin.ik(load_robot(robot), [*target[:3], *np.deg2rad(target[3:])] if len(target) > 2 else target)
     return [
         {
             "joints": np.rad2deg(s.q[b]).tolist(),
@@ -65,7 +65,7 @@ def joints_of(found: list[dict[str, Any]]) -> list[list[float]]:
     return sorted(branch["joints"] for branch in found)
 
 
-def near(values: Any, digits: int) -> Any:
+def near_values(values: Any, digits: int) -> Any:
     return pytest.approx(values, abs=0.5001 * 10.0**-digits)
 
 
@@ -78,7 +78,7 @@ def near(values: Any, digits: int) -> Any:
     [([0, 90, -90], (258, 10, 367)), ([-30, 5, -5], (398.3923, -218.4649, 187.1697))],
 )
 def test_three_dof_forward(how: str, q: list[float], expected: tuple[float, ...]) -> None:
-    assert tip(how, "three_dof", q) == near(expected, 4)
+    assert tip_position(how, "three_dof", q) == near_values(expected, 4)
 
 
 def test_three_dof_closed_form(how: str) -> None:
@@ -90,16 +90,16 @@ def test_three_dof_closed_form(how: str) -> None:
         math.sin(q1) * radius + 10 * math.cos(q1),
         170 + 197 * math.sin(q2) + 258 * math.sin(q2 + q3),
     )
-    assert tip(how, "three_dof", [17, 34, -61]) == pytest.approx(expected, abs=1e-9)
+    assert tip_position(how, "three_dof", [17, 34, -61]) == pytest.approx(expected, abs=1e-9)
 
 
 def test_three_dof_step_chain() -> None:
     # E6: Table 2 leaves out M2's gear ratio (26.85125) and M3's (5); its pulses per turn contain them.
     motors = run("info", "robots/three_dof.yaml", "--json").json["motors"]
     assert [motor["pulses_per_turn"] for motor in motors] == [12800, 42962, 24000]
-    assert [motor["unit_per_pulse"] for motor in motors] == near([0.028125, 0.0083795, 0.015], 7)
-    steps = np.rad2deg(1 / np.abs(np.diag(load("three_dof").motor_gain)))
-    assert steps.tolist() == near([0.028125, 0.0083795, 0.015], 7)
+    assert [motor["unit_per_pulse"] for motor in motors] == near_values([0.028125, 0.0083795, 0.015], 7)
+    steps = np.rad2deg(1 / np.abs(np.diag(load_robot("three_dof").motor_gain)))
+    assert steps.tolist() == near_values([0.028125, 0.0083795, 0.015], 7)
 
 
 def test_three_dof_pulses(how: str) -> None:
@@ -111,19 +111,19 @@ def test_three_dof_pulses(how: str) -> None:
     if how == "cli":
         answer = run("pulses", "robots/three_dof.yaml", -30, 5, -5, "--json").json
         assert answer["pulses"] == answer["moves"] == pulses
-        assert answer["actual_joints"] == near(actual_joints, 6)
-        assert answer["position_mm"]["actual"] == near(actual_tip, 4)
-        assert answer["position_mm"]["difference"] == near(difference, 6)
-        assert answer["error_mm"] == near(math.hypot(*difference), 5)
+        assert answer["actual_joints"] == near_values(actual_joints, 6)
+        assert answer["position_mm"]["actual"] == near_values(actual_tip, 4)
+        assert answer["position_mm"]["difference"] == near_values(difference, 6)
+        assert answer["error_mm"] == near_values(math.hypot(*difference), 5)
     else:
-        arm = load("three_dof")
+        arm = load_robot("three_dof")
         q = np.deg2rad([-30, 5, -5])
         p = armkin.pulses(arm, q)
         back = armkin.joints(arm, p)
         assert p.tolist() == pulses
-        assert np.rad2deg(back).tolist() == near(actual_joints, 6)
-        assert armkin.fk(arm, back)[:3, 3].tolist() == near(actual_tip, 4)
-        assert np.abs(armkin.fk(arm, back) - armkin.fk(arm, q))[:3, 3].tolist() == near(difference, 6)
+        assert np.rad2deg(back).tolist() == near_values(actual_joints, 6)
+        assert armkin.fk(arm, back)[:3, 3].tolist() == near_values(actual_tip, 4)
+        assert np.abs(armkin.fk(arm, back) - armkin.fk(arm, q))[:3, 3].tolist() == near_values(difference, 6)
 
 
 TABLE_5 = {
@@ -143,31 +143,31 @@ TABLE_5 = {
 
 
 def test_three_dof_inverse(how: str) -> None:
-    found = branches(how, "three_dof", [390, 80, 300])
+    found = branches_of(how, "three_dof", [390, 80, 300])
     assert {branch["name"] for branch in found} == set(TABLE_5)
     assert found[0]["name"] == "left, elbow up"  # the least motion from home
     for branch in found:
         joints, _, _, legal = TABLE_5[branch["name"]]
-        assert branch["joints"] == near(joints, 4)
+        assert branch["joints"] == near_values(joints, 4)
         assert branch["within_limits"] is legal
-        assert tip(how, "three_dof", branch["joints"]) == pytest.approx((390, 80, 300), abs=1e-9)
+        assert tip_position(how, "three_dof", branch["joints"]) == pytest.approx((390, 80, 300), abs=1e-9)
 
 
 @pytest.mark.parametrize("name", TABLE_5)
 def test_three_dof_inverse_pulses(how: str, name: str) -> None:
-    [branch] = [branch for branch in branches(how, "three_dof", [390, 80, 300]) if branch["name"] == name]
+    [branch] = [branch for branch in branches_of(how, "three_dof", [390, 80, 300]) if branch["name"] == name]
     _, pulses, actual, _ = TABLE_5[name]
     if how == "cli":
         answer = run("pulses", "robots/three_dof.yaml", *branch["joints"], "--json").json
         counts, joints = answer["pulses"], answer["actual_joints"]
     else:
-        arm = load("three_dof")
+        arm = load_robot("three_dof")
         p = armkin.pulses(arm, np.deg2rad(branch["joints"]))
         counts, joints = p.tolist(), np.rad2deg(armkin.joints(arm, p)).tolist()
     assert tuple(counts) == pulses
-    assert joints[1:] == near(list(actual), 4)
+    assert joints[1:] == near_values(list(actual), 4)
     # E5: q1's "offset" is printed as 0.0020 in all rows.
-    assert abs(joints[0] - branch["joints"][0]) == near(0.0003 if name.startswith("left") else 0.0096, 4)
+    assert abs(joints[0] - branch["joints"][0]) == near_values(0.0003 if name.startswith("left") else 0.0096, 4)
 
 
 def test_three_dof_branch_by_name() -> None:
@@ -187,15 +187,15 @@ def test_three_dof_as_printed() -> None:
         "a: 197, d: -10", "a: 197, d: 10"
     )
     printed = arm.arm_of_file(robot_file.parse_robot_file(other))
-    assert armkin.fk(printed, np.deg2rad([0, -90, 90]))[:3, 3].tolist() == near([258, 10, 367], 4)
-    assert armkin.fk(printed, np.deg2rad([-30, 5, -5]))[2, 3] == near(152.8303, 4)
+    assert armkin.fk(printed, np.deg2rad([0, -90, 90]))[:3, 3].tolist() == near_values([258, 10, 367], 4)
+    assert armkin.fk(printed, np.deg2rad([-30, 5, -5]))[2, 3] == near_values(152.8303, 4)
     # E4: the right arm's rows as printed do not reach the target.
-    shipped = load("three_dof")
+    shipped = load_robot("three_dof")
     for q, where in (
         ((44.6560, -46.5354), (-385.49, -99.49, 300.00)),
         ((-8.4781, -46.5354), (-331.70, -87.03, -70.42)),
     ):
-        assert armkin.fk(shipped, np.deg2rad([-166.9685, *q]))[:3, 3].tolist() == near(where, 2)
+        assert armkin.fk(shipped, np.deg2rad([-166.9685, *q]))[:3, 3].tolist() == near_values(where, 2)
 
 
 # 2. RA-02, DH and product of exponentials --------------------------------------------------------
@@ -212,12 +212,12 @@ RA02 = [
 @pytest.mark.parametrize("robot", ["ra02", "ra02_screws"])
 @pytest.mark.parametrize(("q", "expected"), RA02)
 def test_ra02_forward(how: str, robot: str, q: list[float], expected: tuple[float, ...]) -> None:
-    assert tip(how, robot, q) == near(expected, 3)
+    assert tip_position(how, robot, q) == near_values(expected, 3)
 
 
 def test_ra02_screws_differ_by_a_constant_turn() -> None:
     # Erratum: "identical" holds for positions; the end frames differ by a quarter turn about x.
-    dh, screws = load("ra02"), load("ra02_screws")
+    dh, screws = load_robot("ra02"), load_robot("ra02_screws")
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (1000, 4))
     A, B = armkin.fk(dh, q), armkin.fk(screws, q)
     assert np.abs(A[:, :3, 3] - B[:, :3, 3]).max() < 1e-9
@@ -230,13 +230,13 @@ def test_ra02_screws_differ_by_a_constant_turn() -> None:
 def test_ra02_inverse(how: str, robot: str) -> None:
     # Erratum: eq. 13 loses the quadrant and the mirrored base, q1 + 180 with the same phi.
     q = [30, 20, 60, 40]
-    target = [*tip(how, robot, q), 120]
-    found = joints_of(branches(how, robot, target))
+    target = [*tip_position(how, robot, q), 120]
+    found = joints_of(branches_of(how, robot, target))
     assert len(found) == 4
     assert any(joints == pytest.approx(q, abs=1e-6) for joints in found)
     assert sorted(round(joints[0], 6) for joints in found) == [-150, -150, 30, 30]
     for joints in found:
-        assert tip(how, robot, joints) == pytest.approx(target[:3], abs=1e-9)
+        assert tip_position(how, robot, joints) == pytest.approx(target[:3], abs=1e-9)
         assert math.remainder(sum(joints[1:]) - 120, 360) == pytest.approx(0, abs=1e-9)
 
 
@@ -245,9 +245,9 @@ def test_ra02_inverse(how: str, robot: str) -> None:
 
 def test_planar_2dof_forward(how: str) -> None:
     # Erratum: the text says 20 and 30 degrees; the code and its result use 20 and 50.
-    assert tip(how, "planar_2dof", [20, 50])[:2] == near((290.544567, 350.311815), 6)
+    assert tip_position(how, "planar_2dof", [20, 50])[:2] == near_values((290.544567, 350.311815), 6)
     # The serial monitor, in cm and single precision.
-    assert tip(how, "planar_2dof", [20, 50])[:2] == pytest.approx((290.544567108, 350.311813354), abs=1e-4)
+    assert tip_position(how, "planar_2dof", [20, 50])[:2] == pytest.approx((290.544567108, 350.311813354), abs=1e-4)
 
 
 def test_planar_theta() -> None:
@@ -257,17 +257,17 @@ def test_planar_theta() -> None:
 
 def test_planar_2dof_inverse(how: str) -> None:
     # Erratum: acos > 0 finds only one of the two elbows.
-    found = joints_of(branches(how, "planar_2dof", tip(how, "planar_2dof", [20, 50])[:2]))
+    found = joints_of(branches_of(how, "planar_2dof", tip_position(how, "planar_2dof", [20, 50])[:2]))
     assert len(found) == 2
     assert found[0] == pytest.approx([20, 50], abs=1e-9)
     assert found[1][1] == pytest.approx(-50, abs=1e-9)
 
 
 def test_planar_3dof(how: str) -> None:
-    assert tip(how, "planar_3dof", [20, 50, -30])[:2] == near((367.149, 414.591), 3)
+    assert tip_position(how, "planar_3dof", [20, 50, -30])[:2] == near_values((367.149, 414.591), 3)
     # Erratum: phi1's closed form has a sign error in y2; the two-circle solution is right.
-    x, y, _ = tip(how, "planar_3dof", [20, 50, -30])
-    arm = load("planar_3dof")
+    x, y, _ = tip_position(how, "planar_3dof", [20, 50, -30])
+    arm = load_robot("planar_3dof")
     if how == "cli":
         answer = run("ik", "robots/planar_3dof.yaml", x, y, 40, "--all-branches", "--json").json
         found = joints_of(answer["branches"])
@@ -284,23 +284,23 @@ def test_planar_3dof(how: str) -> None:
 def test_labvolt_case_4(how: str) -> None:
     # Erratum: elbow and wrist heights are printed 24.87 off (389.35, 233.711), the tool 0.05 off.
     frames = frame_positions(how, "labvolt_5150", [45, 35, -90, 90, 90])
-    assert frames["q1"] == near((0, 0, 255.5), 3)
-    assert frames["q2"] == near((110.053, 110.053, 364.480), 3)
-    assert frames["q3"] == near((187.113, 187.113, 208.841), 3)
-    assert frames["tool"] == near((233.755, 233.755, 114.638), 3)
+    assert frames["q1"] == near_values((0, 0, 255.5), 3)
+    assert frames["q2"] == near_values((110.053, 110.053, 364.480), 3)
+    assert frames["q3"] == near_values((187.113, 187.113, 208.841), 3)
+    assert frames["tool"] == near_values((233.755, 233.755, 114.638), 3)
 
 
 def test_labvolt_case_5(how: str) -> None:
     # Erratum: the wrist is printed as (32.289, 107.452, 157.159).
     frames = frame_positions(how, "labvolt_5150", [72, 77, -147, 90, 90])
-    assert frames["q2"] == near((13.208, 40.649, 440.630), 3)
-    assert frames["q3"] == near((33.289, 102.452, 262.089), 3)
-    assert frames["tool"] == near((45.443, 139.859, 154.024), 3)
+    assert frames["q2"] == near_values((13.208, 40.649, 440.630), 3)
+    assert frames["q3"] == near_values((33.289, 102.452, 262.089), 3)
+    assert frames["tool"] == near_values((45.443, 139.859, 154.024), 3)
 
 
 def test_labvolt_roll_does_not_move_the_tip(how: str) -> None:
-    assert tip(how, "labvolt_5150", [45, 35, -90, 90, -20]) == pytest.approx(
-        tip(how, "labvolt_5150", [45, 35, -90, 90, 90]), abs=1e-9
+    assert tip_position(how, "labvolt_5150", [45, 35, -90, 90, -20]) == pytest.approx(
+        tip_position(how, "labvolt_5150", [45, 35, -90, 90, 90]), abs=1e-9
     )
 
 
@@ -308,7 +308,7 @@ def test_labvolt_roll_does_not_move_the_tip(how: str) -> None:
 
 
 def test_pan_tilt(how: str) -> None:
-    assert tip(how, "pan_tilt", [36, 45]) == near((270.3069, 1432.4574, -1060.6602), 4)
+    assert tip_position(how, "pan_tilt", [36, 45]) == near_values((270.3069, 1432.4574, -1060.6602), 4)
 
 
 def test_pan_tilt_has_no_inverse_task() -> None:
@@ -316,10 +316,10 @@ def test_pan_tilt_has_no_inverse_task() -> None:
     assert (completed.code, completed.out) == (2, "")
     assert "no task fits" in completed.err
     with pytest.raises(armkin.UsageError, match="no task fits"):
-        armkin.ik(load("pan_tilt"), [270, 1432, -1060])
+        armkin.ik(load_robot("pan_tilt"), [270, 1432, -1060])
 
 
-def circle(degrees: float) -> list[float]:
+def circle_points(degrees: float) -> list[float]:
     """The homework's path: radius 400 about (0, 0, 660), tilted by -45 degrees."""
     t, tilt = math.radians(degrees), math.radians(-45)
     along = 400 * math.cos(t)
@@ -336,15 +336,15 @@ def circle(degrees: float) -> list[float]:
 def test_yaw_two_link(
     how: str, t: float, point: tuple[float, ...], digits: int, expected: list[tuple[float, ...]]
 ) -> None:
-    assert circle(t) == near(point, digits)
+    assert circle_points(t) == near_values(point, digits)
     # It leaves out the two branches with the base turned round.
-    found = joints_of(branches(how, "yaw_two_link", circle(t)))
+    found = joints_of(branches_of(how, "yaw_two_link", circle_points(t)))
     assert len(found) == 4
     for joints in expected:
-        assert any(branch == near(joints, 3) for branch in found)
+        assert any(branch == near_values(joints, 3) for branch in found)
 
 
 def test_yaw_two_link_path(how: str) -> None:
     for k in range(11):
-        for branch in branches(how, "yaw_two_link", circle(36 * k)):
-            assert tip(how, "yaw_two_link", branch["joints"]) == pytest.approx(circle(36 * k), abs=1e-9)
+        for branch in branches_of(how, "yaw_two_link", circle_points(36 * k)):
+            assert tip_position(how, "yaw_two_link", branch["joints"]) == pytest.approx(circle_points(36 * k), abs=1e-9)

@@ -35,7 +35,7 @@ def page(request: pytest.FixtureRequest) -> Path:
 
 
 @contextmanager
-def inside(folder: Path) -> Iterator[None]:
+def inside_folder(folder: Path) -> Iterator[None]:
     before = Path.cwd()
     os.chdir(folder)
     try:
@@ -44,13 +44,13 @@ def inside(folder: Path) -> Iterator[None]:
         os.chdir(before)
 
 
-def commands(text: str) -> list[tuple[str, str]]:
+def shown_commands(text: str) -> list[tuple[str, str]]:
     """Every `$ command` of the console blocks, with the output shown below it."""
     parts = (part for block in CONSOLE.findall(text) for part in re.split(r"^\$ ", block, flags=re.M)[1:])
     return [(command, output.rstrip("\n")) for command, _, output in (part.partition("\n") for part in parts)]
 
 
-def printed(command: str, folder: Path) -> str:
+def printed_output(command: str, folder: Path) -> str:
     words = shlex.split(command)
     assert words[0] == "armkin", command
     completed = run(*words[1:], cwd=folder)
@@ -82,9 +82,9 @@ def test_commands_print_what_the_page_shows(page: Path, tmp_path: Path) -> None:
     if page in TUTORIALS:
         for name, content in FILE.findall(text):
             (tmp_path / name).write_text(content)
-    shown = commands(text)
+    shown = shown_commands(text)
     assert len(shown) >= 2
-    outputs = {command: printed(command, folder) for command, _ in shown}
+    outputs = {command: printed_output(command, folder) for command, _ in shown}
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
         page.write_text(written_anew(text, outputs))
         return
@@ -96,7 +96,7 @@ def test_commands_print_what_the_page_shows(page: Path, tmp_path: Path) -> None:
 
 
 def test_python_examples_run(page: Path) -> None:
-    with inside(ROOT):
+    with inside_folder(ROOT):
         for block in PYTHON.findall(page.read_text()):
             exec(block, {})
 

@@ -9,7 +9,7 @@ import pytest
 from armkin import robot_file
 from armkin.forward import fk, frames
 from armkin.keep_out.load_with_scene import load
-from urdf_chains import CHAINS, moving, pose
+from urdf_chains import CHAINS, moving_joints, tip_pose
 
 ROBOTS = Path(__file__).parents[1] / "robots"
 UP = [0, 0, 0, 0, 0, 0]
@@ -114,10 +114,10 @@ def test_makers_reaches() -> None:
 def test_a_shipped_arm_is_its_source_s_urdf(name: str) -> None:
     """The robot file against the URDF's chain as numbers, walked by tests/urdf_chains.py: to 0.01 mm."""
     chain, arm = CHAINS[name], load(name)
-    joints = [joint["name"] for joint in moving(chain) if joint["type"] != "fixed"]
+    joints = [joint["name"] for joint in moving_joints(chain) if joint["type"] != "fixed"]
     for q in np.random.default_rng(3).uniform(-3, 3, (20, arm.n)):
         assert fk(arm, q)[:3, 3] == pytest.approx(
-            1000 * pose(chain, dict(zip(joints, q, strict=True)))[:3, 3], abs=0.02
+            1000 * tip_pose(chain, dict(zip(joints, q, strict=True)))[:3, 3], abs=0.02
         )
 
 
@@ -176,12 +176,12 @@ joints:
     assert arm.file is not None
     for joint, value in zip(arm.file.joints, q, strict=True):
         w, v = joint.twist()
-        expected = expected @ exponential(np.array(w), np.array(v), value)
+        expected = expected @ screw_exponential(np.array(w), np.array(v), value)
     expected = expected @ [[1, 0, 0, 300], [0, 1, 0, 0], [0, 0, 1, 115], [0, 0, 0, 1]]
     assert fk(arm, q) == pytest.approx(expected, abs=1e-11)
 
 
-def exponential(w: np.ndarray, v: np.ndarray, value: float) -> np.ndarray:
+def screw_exponential(w: np.ndarray, v: np.ndarray, value: float) -> np.ndarray:
     """exp([S] q), Lynch & Park, Modern Robotics, eq. 3.88."""
     W = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
     s, c = math.sin(value), math.cos(value)

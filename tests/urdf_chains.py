@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 CHAINS: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "robot_file/urdf_chains.json").read_text())
 
 
-def text(chain: Mapping[str, Any]) -> str:
+def urdf_text(chain: Mapping[str, Any]) -> str:
     """The chain as a URDF file."""
     parts = [f"<link name={quoteattr(link)}/>" for link in chain["links"]]
     for joint in chain["joints"]:
@@ -38,7 +38,7 @@ def text(chain: Mapping[str, Any]) -> str:
     return '<?xml version="1.0"?>\n<robot name="arm">\n' + "\n".join(parts) + "\n</robot>\n"
 
 
-def moving(chain: Mapping[str, Any]) -> list[dict[str, Any]]:
+def moving_joints(chain: Mapping[str, Any]) -> list[dict[str, Any]]:
     """The joints from base to tip."""
     by_child = {joint["child"]: joint for joint in chain["joints"]}
     link, found = chain["tip"], []
@@ -48,30 +48,37 @@ def moving(chain: Mapping[str, Any]) -> list[dict[str, Any]]:
     return found[::-1]
 
 
-def pose(chain: Mapping[str, Any], values: Mapping[str, float]) -> NDArray[np.float64]:
+def tip_pose(chain: Mapping[str, Any], values: Mapping[str, float]) -> NDArray[np.float64]:
     """The tip in the base [m] for joint values [rad | m] by name."""
     T = np.eye(4)
-    for joint in moving(chain):
+    for joint in moving_joints(chain):
         xyz, rpy = (np.array(joint.get(key, "0 0 0").split(), dtype=float) for key in ("xyz", "rpy"))
-        T = T @ rigid(turn([0, 0, 1], rpy[2]) @ turn([0, 1, 0], rpy[1]) @ turn([1, 0, 0], rpy[0]), xyz)
+        T = T @ rigid_transform(
+            rotation_about([0, 0, 1], rpy[2]) @ rotation_about([0, 1, 0], rpy[1]) @ rotation_about([1, 0, 0], rpy[0]),
+            xyz,
+        )
         if joint["type"] == "fixed":
             continue
         axis = np.array(joint.get("axis", "1 0 0").split(), dtype=float)
         axis /= np.sqrt(axis @ axis)
         value = values[joint["name"]]
         slides = joint["type"] == "prismatic"
-        T = T @ (rigid(np.eye(3), axis * value) if slides else rigid(turn(axis, value), np.zeros(3)))
+        T = T @ (
+            rigid_transform(np.eye(3), axis * value)
+            if slides
+            else rigid_transform(rotation_about(axis, value), np.zeros(3))
+        )
     return T
 
 
-def turn(axis: Any, angle: float) -> NDArray[np.float64]:
+def rotation_about(axis: Any, angle: float) -> NDArray[np.float64]:
     """Rodrigues' formula."""
     x, y, z = axis
     K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))
 
 
-def rigid(R: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
+def rigid_transform(R: NDArray[np.float64], p: NDArray[np.float64]) -> NDArray[np.float64]:
     """A 4 x 4 transform."""
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, p

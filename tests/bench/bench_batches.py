@@ -52,7 +52,7 @@ def targets(arm: armkin.Arm, kind: str, count: int) -> np.ndarray | None:
     return np.asarray(targets_of(task_for(arm), T, q))
 
 
-def least(work: Callable[[], Any], runs: int = RUNS) -> float:
+def least_cpu(work: Callable[[], Any], runs: int = RUNS) -> float:
     """Processor seconds, the least of several runs."""
     times = []
     for _ in range(runs):
@@ -96,15 +96,15 @@ def main() -> None:
                 fast.ik(T[:2])
                 armkin.ik(arm, T[:2])
                 plain, quick, inside = (
-                    1e6 * least(lambda T=T: armkin.ik(arm, T)) / size,  # type: ignore[misc]
-                    1e6 * least(lambda T=T: fast.ik(T)) / size,  # type: ignore[misc]
+                    1e6 * least_cpu(lambda T=T: armkin.ik(arm, T)) / size,  # type: ignore[misc]
+                    1e6 * least_cpu(lambda T=T: fast.ik(T)) / size,  # type: ignore[misc]
                     1e6 * min(c_alone(fast, T) for _ in range(RUNS)) / size,
                 )
                 worst = ""
                 if size in (slow_count, FEW):
                     sampled = range(min(ALONE, size))
                     singles = [
-                        max(1e6 * least(lambda k=k, f=f: f(T[k]), 2) for k in sampled)  # type: ignore[misc]
+                        max(1e6 * least_cpu(lambda k=k, f=f: f(T[k]), 2) for k in sampled)  # type: ignore[misc]
                         for f in (lambda goal: armkin.ik(arm, goal), fast.ik)
                     ]
                     worst = f"{singles[0]:10.0f} / {singles[1]:.0f}"

@@ -44,15 +44,15 @@ class Spent(NamedTuple):
 
 def poses(count: int) -> np.ndarray:
     """Random typed targets (count, 6) of a UR5e."""
-    return typed(armkin.load("ur5e"), np.random.default_rng(3).uniform(-np.pi, np.pi, (count, 6)))
+    return typed_targets(armkin.load("ur5e"), np.random.default_rng(3).uniform(-np.pi, np.pi, (count, 6)))
 
 
-def typed(arm: Any, q: np.ndarray) -> np.ndarray:
+def typed_targets(arm: Any, q: np.ndarray) -> np.ndarray:
     """Targets (N, 6) [mm, deg] of joint values as people write them."""
     return np.round(targets_out(LABELS, targets_of(task_for(arm, None), armkin.fk(arm, q), q)), 3)
 
 
-def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
+def write_targets(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
     """The targets in each format, and "all branches" as CSV."""
     import pyarrow as pa
     import pyarrow.parquet as parquet
@@ -67,33 +67,33 @@ def write(values: np.ndarray, folder: Path, name: str) -> dict[str, Path]:
     return path_of | {"all branches": path_of["csv"]}
 
 
-def spent(*words: Any, times: int = 3) -> Spent:
+def least_cost(*words: Any, times: int = 3) -> Spent:
     """The least CPU time of some runs of a command, with byte code as an installed package has it."""
     environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": ""}
     least = Spent(np.inf, np.inf)
     for _ in range(times):
-        began, clock = _children(), time.perf_counter()
+        began, clock = _children_cpu(), time.perf_counter()
         subprocess.run(
             [sys.executable, "-m", "armkin", *map(str, words)],
             env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, check=False,
         )  # fmt: skip
-        cost = Spent(_children() - began, time.perf_counter() - clock)
+        cost = Spent(_children_cpu() - began, time.perf_counter() - clock)
         least = Spent(min(cost.cpu, least.cpu), min(cost.wall, least.wall))
     return least
 
 
-def _children() -> float:
+def _children_cpu() -> float:
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     return used.ru_utime + used.ru_stime
 
 
-def batch(source: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
+def batch_command(source: Path, folder: Path, *more: Any) -> tuple[Any, ...]:
     """The command."""
     target = folder / f"out{source.suffix}"
     return ("ik", "ur5e", "--batch", source, "--compiled", "--out", target, *more)
 
 
-def reference() -> float:
+def numpy_us_a_pose() -> float:
     """CPU time of a pose solved in numpy [us], the least of five: how busy the machine is."""
     arm, least = armkin.load("ur5e"), np.inf
     T = armkin.fk(arm, np.random.default_rng(1).uniform(-3.0, 3.0, (16_384, 6)))
@@ -104,17 +104,17 @@ def reference() -> float:
     return least / len(T) * 1e6
 
 
-def rows(folder: Path, count: int) -> bool:
+def meets_row_bar(folder: Path, count: int) -> bool:
     """CPU time a row, best branch and all."""
     values, good = poses(count), True
     print(
-        f"a pose solved in numpy: {reference():.2f} us here, {AT_REST:g} on a machine at rest (docs/figures.md)",
+        f"a pose solved in numpy: {numpy_us_a_pose():.2f} us here, {AT_REST:g} on a machine at rest (docs/figures.md)",
         flush=True,
     )
-    tenth, every_row = write(values[: count // 10], folder, "few"), write(values, folder, "many")
+    tenth, every_row = write_targets(values[: count // 10], folder, "few"), write_targets(values, folder, "many")
     for name, bar in BARS.items():
         more = ("--all-branches",) if name == "all branches" else ()
-        small, large = (spent(*batch(files[name], folder, *more)).cpu for files in (tenth, every_row))
+        small, large = (least_cost(*batch_command(files[name], folder, *more)).cpu for files in (tenth, every_row))
         slope, with_start = (large - small) / (0.9 * count) * 1e6, large / count * 1e6
         good &= slope <= bar
         print(
@@ -124,7 +124,7 @@ def rows(folder: Path, count: int) -> bool:
     return good
 
 
-def unsolvable(folder: Path, count: int) -> bool:
+def meets_unsolvable_bar(folder: Path, count: int) -> bool:
     """Rows far away, outside the limits, and of a straight elbow, which rounding takes a little too far."""
     good, count = True, count // 4
     rng, arm, tight = np.random.default_rng(4), armkin.load("ur5e"), armkin.load("irb120")
@@ -133,39 +133,39 @@ def unsolvable(folder: Path, count: int) -> bool:
     straight = np.where(np.arange(6) == 2, 0.0, q[: count // 50])
     cases = {
         "far away": ("ur5e", poses(count) * [3.0, 3.0, 3.0, 1.0, 1.0, 1.0]),
-        "outside limits": ("irb120", typed(tight, bent)),
-        "a little too far": ("ur5e", typed(arm, straight)),
+        "outside limits": ("irb120", typed_targets(tight, bent)),
+        "a little too far": ("ur5e", typed_targets(arm, straight)),
     }
     for name, (robot, values) in cases.items():
-        every_row = write(values, folder, "off")["csv"]
-        tenth = write(values[: len(values) // 10], folder, "few")["csv"]
-        costs = [spent("ik", robot, *batch(path, folder)[2:]).cpu for path in (tenth, every_row)]
+        every_row = write_targets(values, folder, "off")["csv"]
+        tenth = write_targets(values[: len(values) // 10], folder, "few")["csv"]
+        costs = [least_cost("ik", robot, *batch_command(path, folder)[2:]).cpu for path in (tenth, every_row)]
         rate = 0.9 * len(values) / max(costs[1] - costs[0], 1e-3)
         good &= rate >= UNSOLVABLE
         print(f"{name:17}{len(values):,} rows: {rate:,.0f} a second (bar {UNSOLVABLE:,})", flush=True)
     return good
 
 
-def workers(folder: Path, count: int) -> bool:
+def meets_worker_bar(folder: Path, count: int) -> bool:
     """Two processes against one: wall time, and what it would be on two cores that do nothing else."""
-    source = write(poses(count), folder, "many")["csv"]
-    alone, two = (spent(*batch(source, folder, "--workers", n)) for n in (1, 2))
+    source = write_targets(poses(count), folder, "many")["csv"]
+    alone, two = (least_cost(*batch_command(source, folder, "--workers", n)) for n in (1, 2))
     print(f"workers      1: {alone.cpu:.2f} s of CPU, {alone.wall:.2f} s; 2: {two.cpu:.2f} s, {two.wall:.2f} s")
     faster, most = alone.wall / two.wall, 2 * alone.cpu / two.cpu
     print(f"{'':13}{faster:.2f} times as fast (bar {FASTER}), at most {most:.2f} by the CPU time")
     return alone.wall / two.wall >= FASTER
 
 
-def memory(folder: Path, count: int) -> bool:
+def meets_memory_bar(folder: Path, count: int) -> bool:
     """Memory of a process for some rows, and for ten times as many: the same hundred thousand again and again."""
     block, peak_of = min(count // 10, 100_000), {}
-    heading, _, lines = write(poses(block), folder, "block")["csv"].read_text().partition("\n")
+    heading, _, lines = write_targets(poses(block), folder, "block")["csv"].read_text().partition("\n")
     for name, size in (("few", count // 10), ("many", count)):
         source = folder / f"{name}.csv"
         with source.open("w") as file:
             file.write(f"{heading}\n")
             file.writelines(lines for _ in range(size // block))
-        words = [sys.executable, "-m", "armkin", *map(str, batch(source, folder))]
+        words = [sys.executable, "-m", "armkin", *map(str, batch_command(source, folder))]
         # by way of a small process: what a process had before it became the command counts as the command's
         completed = subprocess.run([sys.executable, "-c", _LARGEST, *words], capture_output=True, text=True, check=True)
         peak_of[name] = int(completed.stdout) / 1024
@@ -180,7 +180,7 @@ print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 """
 
 
-def busy(job: float, chunk: bytes) -> bytes:
+def busy_chunk(job: float, chunk: bytes) -> bytes:
     """A chunk that takes `job` seconds of CPU time."""
     end = time.thread_time() + job
     while time.thread_time() < end:
@@ -188,13 +188,13 @@ def busy(job: float, chunk: bytes) -> bytes:
     return chunk
 
 
-def waiting(job: float, chunk: bytes) -> bytes:
+def waiting_chunk(job: float, chunk: bytes) -> bytes:
     """A chunk that takes `job` seconds and no CPU time: all of what its worker takes is Dask's."""
     time.sleep(job)
     return chunk
 
 
-def cluster(folder: Path, count: int) -> bool:
+def meets_cluster_bar(folder: Path, count: int) -> bool:
     """What a Dask worker of one thread takes beside chunks of a second, a megabyte each way; scheduler and client.
 
     Chunks that wait are a second long however busy the machine is, so that heartbeats and the worker's profiler weigh
@@ -213,13 +213,13 @@ def cluster(folder: Path, count: int) -> bool:
     ):  # fmt: skip
         try:
             sys.modules.setdefault("bench_columns", sys.modules["__main__"])
-            busy.__module__ = waiting.__module__ = "bench_columns"
-            address, pids = _address(file), (worker.pid, scheduler.pid)
+            busy_chunk.__module__ = waiting_chunk.__module__ = "bench_columns"
+            address, pids = _scheduler_address(file), (worker.pid, scheduler.pid)
             with distributed.Client(address) as client:  # type: ignore[no-untyped-call]
                 client.wait_for_workers(1, timeout=120)
-            _beside(address, pids, waiting, 0.01, 3)  # imports
-            share = _beside(address, pids, waiting, 1.0, 24)
-            work = _beside(address, pids, busy, 1.0, 12)
+            _cost_a_chunk(address, pids, waiting_chunk, 0.01, 3)  # imports
+            share = _cost_a_chunk(address, pids, waiting_chunk, 1.0, 24)
+            work = _cost_a_chunk(address, pids, busy_chunk, 1.0, 12)
         finally:
             worker.kill()
             scheduler.kill()
@@ -242,18 +242,18 @@ class Beside(NamedTuple):
     wall: float
 
 
-def _beside(address: str, pids: tuple[int, int], work: Any, job: float, count: int) -> Beside:
+def _cost_a_chunk(address: str, pids: tuple[int, int], work: Any, job: float, count: int) -> Beside:
     """What `count` chunks take of worker, scheduler and this process, a chunk."""
     from armkin.engines.ordered_chunks import Engine, in_order
 
-    before = [*map(_used, pids), time.process_time(), time.perf_counter()]
+    before = [*map(_process_cpu, pids), time.process_time(), time.perf_counter()]
     for _ in in_order(Engine(cluster=address), work, job, [bytes(1 << 20)] * count):
         pass
-    after = [*map(_used, pids), time.process_time(), time.perf_counter()]
+    after = [*map(_process_cpu, pids), time.process_time(), time.perf_counter()]
     return Beside(*((end - begin) / count for begin, end in zip(before, after, strict=True)))
 
 
-def _address(file: Path) -> str:
+def _scheduler_address(file: Path) -> str:
     import json
 
     while not (file.exists() and file.stat().st_size):
@@ -261,13 +261,19 @@ def _address(file: Path) -> str:
     return str(json.loads(file.read_text())["address"])
 
 
-def _used(pid: int) -> float:
+def _process_cpu(pid: int) -> float:
     """CPU time of a process [s]."""
     fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-PARTS = {"rows": rows, "unsolvable": unsolvable, "workers": workers, "memory": memory, "cluster": cluster}
+PARTS = {
+    "rows": meets_row_bar,
+    "unsolvable": meets_unsolvable_bar,
+    "workers": meets_worker_bar,
+    "memory": meets_memory_bar,
+    "cluster": meets_cluster_bar,
+}
 
 
 def results() -> Iterator[bool]:

@@ -23,8 +23,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 
-from bench_ik import ROBOTS, best_time, peer_job, random_joints, targets
-from exported import agreement
+from bench_ik import ROBOTS, best_time, peer_job, random_joints, targets_of
+from exported import compare_answers
 
 import armkin
 
@@ -42,7 +42,7 @@ ROWS = [
 ]
 
 
-def speed(poses: int, only: str | None) -> None:
+def print_speed(poses: int, only: str | None) -> None:
     print(
         "| arm | compiled us/pose | wall, 1 and 2 workers | numpy us/pose | peer | its us/pose | faster | one pose us |"
     )
@@ -53,7 +53,7 @@ def speed(poses: int, only: str | None) -> None:
         arm = armkin.load(ROBOTS / f"{name}.yaml")
         fast = armkin.compile(arm)
         q = random_joints(arm, int(poses * share))
-        goal = targets(arm, None, q)
+        goal = targets_of(arm, None, q)
         jobs: list[Callable[[], object]] = [
             lambda: fast.ik(goal),
             lambda: armkin.ik(arm, goal[:5000]),
@@ -76,7 +76,7 @@ def speed(poses: int, only: str | None) -> None:
         )
 
 
-def agree(count: int, only: str | None) -> None:
+def print_agreement(count: int, only: str | None) -> None:
     print("| arm | poses | exported: edges | different | joints apart | fk apart | compiled: different |")
     print("|---|---|---|---|---|---|---|")
     for name, _, share in ROWS:
@@ -85,9 +85,9 @@ def agree(count: int, only: str | None) -> None:
         arm = armkin.load(ROBOTS / f"{name}.yaml")
         N = int(count * share) if not only else count
         with tempfile.TemporaryDirectory() as folder:
-            compared = agreement(arm, Path(folder), N)
+            compared = compare_answers(arm, Path(folder), N)
         q = random_joints(arm, N)
-        goal = targets(arm, None, q)
+        goal = targets_of(arm, None, q)
         a, b = armkin.ik(arm, goal), armkin.compile(arm).ik(goal)
         masks = ("valid", "within_limits", "branch", "status")
         alike = a.q.shape == b.q.shape and np.all(
@@ -107,13 +107,13 @@ _PEAK = """
 import resource, sys, numpy as np, armkin
 arm = armkin.load(sys.argv[1]); N = int(sys.argv[2])
 sys.path.insert(0, sys.argv[4])
-from bench_ik import random_joints, targets
+from bench_ik import random_joints, targets_of
 fast = armkin.compile(arm) if sys.argv[3] == "compiled" else None
 solve = fast.ik if fast else lambda goal: armkin.ik(arm, goal)
-first = targets(arm, None, random_joints(arm, 5000))
+first = targets_of(arm, None, random_joints(arm, 5000))
 goal = np.empty((N, *first.shape[1:]))
 for k in range(0, N, 5000):
-    goal[k : k + 5000] = targets(arm, None, random_joints(arm, 5000, k))
+    goal[k : k + 5000] = targets_of(arm, None, random_joints(arm, 5000, k))
 solve(goal[:5000])
 before = int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize()
 s = solve(goal)
@@ -126,7 +126,7 @@ print(results / 1e6, (peak - before - results) / 1e6)
 """
 
 
-def memory(count: int, only: str | None) -> None:
+def print_memory(count: int, only: str | None) -> None:
     print("| arm | way | results MB | peak beyond the results MB |")
     print("|---|---|---|---|")
     for name, _, share in ROWS[:8]:
@@ -147,11 +147,11 @@ def main() -> None:
     parser.add_argument("--only", help="one robot")
     args = parser.parse_args()
     if args.agree:
-        agree(args.agree, args.only)
+        print_agreement(args.agree, args.only)
     elif args.memory:
-        memory(args.memory, args.only)
+        print_memory(args.memory, args.only)
     else:
-        speed(args.poses, args.only)
+        print_speed(args.poses, args.only)
 
 
 if __name__ == "__main__":

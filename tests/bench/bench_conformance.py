@@ -17,10 +17,10 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 from armkin.board import conformance
 from armkin.board.conformance import Start
-from emulated_kinds import EMULATED, start
+from emulated_kinds import EMULATED, starter_of
 
 
-def passed(kind: str, begin: Start) -> bool:
+def all_cases_pass(kind: str, begin: Start) -> bool:
     """Run all cases, print one row each; whether all pass."""
     good = True
     for case in conformance.CASES:
@@ -38,13 +38,13 @@ def main(kinds: list[str]) -> int:
     good = True
     for kind in kinds or EMULATED:
         if not kind.startswith("chip:"):
-            good &= passed(kind, start(kind))
+            good &= all_cases_pass(kind, starter_of(kind))
             continue
         import emulated_chips
         from emulator import EmulatedBoard
 
         with EmulatedBoard(kind.removeprefix("chip:"), speed="step") as board:
-            good &= passed(kind, emulated_chips.start(board))
+            good &= all_cases_pass(kind, emulated_chips.starter_of(board))
     return not good
 
 

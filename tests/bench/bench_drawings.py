@@ -30,7 +30,7 @@ def main(count: int) -> None:
         print("  beyond:", np.flatnonzero(distances > 0.01).tolist())
     right = 0
     for seed in range(count):
-        lines, rng = random_drawings.program(seed).splitlines(), np.random.default_rng(seed)
+        lines, rng = random_drawings.random_program(seed).splitlines(), np.random.default_rng(seed)
         k = int(rng.integers(2, max(3, len(lines) // 2)))
         lines.insert(k, BROKEN[seed % len(BROKEN)])
         try:

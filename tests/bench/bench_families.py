@@ -17,7 +17,7 @@ import numpy as np
 import armkin
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
-from redundant_arms import covers, held_answers, postures  # noqa: E402
+from redundant_arms import covers_value, held_answers, redundant_postures  # noqa: E402
 
 from armkin.inverse.solvers.redundant import redundancy  # noqa: E402
 
@@ -30,14 +30,14 @@ def main() -> None:
     count, brute = (int(word) for word in (sys.argv[1:] + ["10000", "20"][len(sys.argv) - 1 :]))
     print("arm          targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
     for name in ARMS:
-        print(row(name, count, brute), flush=True)
+        print(family_row(name, count, brute), flush=True)
 
 
-def row(name: str, count: int, brute: int) -> str:
+def family_row(name: str, count: int, brute: int) -> str:
     arm = armkin.load(name)
     free = redundancy(arm, None)
     assert free is not None
-    q, target = postures(arm, None, count, 11)
+    q, target = redundant_postures(arm, None, count, 11)
     armkin.ik(arm, target[:1])
     lost = missed = rows = 0
     spent = 0.0
@@ -49,7 +49,7 @@ def row(name: str, count: int, brute: int) -> str:
         rows += int(s.within_limits.sum())
         lost += int((s.best < 0).sum())
         for k in range(len(s.valid)):
-            missed += not covers(arm, s.interval[k][s.within_limits[k]], q[begin + k, free.joint], 1e-8).any()
+            missed += not covers_value(arm, s.interval[k][s.within_limits[k]], q[begin + k, free.joint], 1e-8).any()
     alone = []
     for k in range(20):
         start = time.process_time()
@@ -75,7 +75,7 @@ def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int
             if arm.lower[joint] < value < arm.upper[joint]:
                 places += 1
                 held = held_answers(arm, joint, float(value), target[k], None)
-                wrong_counts += int(covers(arm, legal, float(value), 0.0).sum()) != len(held)
+                wrong_counts += int(covers_value(arm, legal, float(value), 0.0).sum()) != len(held)
     return places, wrong_counts
 
 

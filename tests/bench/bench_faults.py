@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 from emulator import EmulatedBoard
-from pins import at_rest, net, on_the_line
+from pins import at_rest, net_steps, on_the_line
 
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, run_process
 
@@ -49,25 +49,25 @@ class Struck(NamedTuple):
     onward: str
 
 
-def send(board: EmulatedBoard, *words: str) -> tuple[object, ...]:
+def send_command(board: EmulatedBoard, *words: str) -> tuple[object, ...]:
     """The words of the motion."""
     return ("send", THREE_DOF, *POSE, "--port", board.port, *words)
 
 
-def begin(board: EmulatedBoard, moment: float) -> subprocess.Popen[bytes]:
+def begin_sender(board: EmulatedBoard, moment: float) -> subprocess.Popen[bytes]:
     """A sender, `moment` seconds after the first step; negative: so long after its start."""
-    command = [sys.executable, "-m", "armkin", *map(str, send(board, "--assume-home"))]
+    command = [sys.executable, "-m", "armkin", *map(str, send_command(board, "--assume-home"))]
     sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     if moment < 0:
         time.sleep(-moment)
         return sender
-    while net(board) == START and sender.poll() is None:
+    while net_steps(board) == START and sender.poll() is None:
         time.sleep(0.005)
     time.sleep(moment)
     return sender
 
 
-def strike(board: EmulatedBoard, sender: subprocess.Popen[bytes], fault: str, rng: random.Random) -> None:
+def strike_fault(board: EmulatedBoard, sender: subprocess.Popen[bytes], fault: str, rng: random.Random) -> None:
     """The fault itself."""
     if fault == "kill":
         sender.kill()
@@ -83,20 +83,20 @@ def strike(board: EmulatedBoard, sender: subprocess.Popen[bytes], fault: str, rn
         board.control(fault)
 
 
-def codes(fault: str) -> set[int]:
+def allowed_codes(fault: str) -> set[int]:
     """Exit codes that a sender may end with, as a shell tells them; 0 only at the goal."""
     return {0, 137 if fault == "kill" else SIGNALS.get(fault, 5)}
 
 
-def one(fault: str, seed: int) -> Struck:
+def run_fault(fault: str, seed: int) -> Struck:
     """One fault on a fresh board."""
     rng = random.Random(f"{fault} {seed}")
     moment = rng.uniform(-0.2, 1.05) * SECONDS
     wrong: list[str] = []
     with EmulatedBoard(seed=seed + 1, bootloader=200 if seed % 2 else None, patience=0) as board:
-        sender = begin(board, moment)
-        moving = net(board) != START
-        strike(board, sender, fault, rng)
+        sender = begin_sender(board, moment)
+        moving = net_steps(board) != START
+        strike_fault(board, sender, fault, rng)
         try:
             _, err = sender.communicate(timeout=30)
         except subprocess.TimeoutExpired:
@@ -106,7 +106,7 @@ def one(fault: str, seed: int) -> Struck:
         stopped = at_rest(board)
         code = sender.returncode if sender.returncode >= 0 else 128 - sender.returncode
         # before that, Python's own start may meet the signal
-        if moment > 0 and (b"Traceback" in err or code not in codes(fault)):
+        if moment > 0 and (b"Traceback" in err or code not in allowed_codes(fault)):
             wrong.append(f"exit {code}: {err.decode()[-200:]}")
         if code == 0 and stopped != COUNTS:
             wrong.append("exit 0 before the goal")
@@ -127,18 +127,18 @@ def one(fault: str, seed: int) -> Struck:
 
 def _go_on(board: EmulatedBoard, position: str, wrong: list[str]) -> str:
     """The next commands, and what they show to be wrong. What a busy computer holds is resumed, five times at most."""
-    before = net(board)
+    before = net_steps(board)
     if position == "lost":
-        if run_process(*send(board)).code != 5 or at_rest(board) != before:
+        if run_process(*send_command(board)).code != 5 or at_rest(board) != before:
             wrong.append("a lost position was gone on from")
         return "refused"
     how = "resumed"
-    completed = run_process(*send(board, "--resume"))
+    completed = run_process(*send_command(board, "--resume"))
     if completed.code == 2:
-        how, completed = "sent again", run_process(*send(board))
+        how, completed = "sent again", run_process(*send_command(board))
     for _ in range(5):
         if completed.code == 5:
-            how, completed = "resumed twice", run_process(*send(board, "--resume"))
+            how, completed = "resumed twice", run_process(*send_command(board, "--resume"))
     if completed.code or at_rest(board) != COUNTS:
         wrong.append(f"it does not go on: {completed.code} {completed.err}")
     return how
@@ -154,7 +154,7 @@ def main() -> None:
         faults = FAULTS[kind]
         seeds = range(1000 * arguments.seed, 1000 * arguments.seed + len(faults))
         with ThreadPoolExecutor(arguments.jobs) as pool:
-            struck = list(pool.map(one, faults, seeds))
+            struck = list(pool.map(run_fault, faults, seeds))
         good = sum(not s.wrong for s in struck)
         positions = ", ".join(f"{n} {outcome}" for outcome, n in Counter(s.position for s in struck).most_common())
         onward = ", ".join(f"{n} {outcome}" for outcome, n in Counter(s.onward for s in struck).most_common())

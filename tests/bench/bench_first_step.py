@@ -61,7 +61,7 @@ def first_steps(runs: int) -> tuple[list[float], float]:
 def short_moves(moves: int, load: int) -> tuple[int, int, float]:
     """Moves of a few degrees, each from rest, with `load` busy processes: how many arrived, were held, and seconds."""
     arm = armkin.load("three_dof")
-    busy = [multiprocessing.Process(target=_spin, daemon=True) for _ in range(load)]
+    busy = [multiprocessing.Process(target=_keep_core_busy, daemon=True) for _ in range(load)]
     for process in busy:
         process.start()
     arrived = held = 0
@@ -89,7 +89,7 @@ def short_moves(moves: int, load: int) -> tuple[int, int, float]:
     return arrived, held, time.monotonic() - begin
 
 
-def _spin() -> None:
+def _keep_core_busy() -> None:
     os.nice(0)
     while True:
         sum(range(10_000))

@@ -14,7 +14,7 @@ from bench_ik import ROBOTS, best_time, random_joints
 import armkin
 
 
-def toolbox(arm: armkin.Arm) -> Any:
+def toolbox_arm(arm: armkin.Arm) -> Any:
     """The same arm as an elementary transform sequence, or None if the toolbox is not installed."""
     try:
         from roboticstoolbox import DHRobot, RevoluteDH
@@ -35,7 +35,7 @@ def main() -> None:
     for name in ("three_dof", "puma560", "ur5e"):
         arm = armkin.load(ROBOTS / f"{name}.yaml")
         q = random_joints(arm, 100_000)
-        ets = toolbox(arm)
+        ets = toolbox_arm(arm)
         jobs = [lambda: armkin.fk(arm, q)]
         if ets is not None:
             jobs.append(lambda: ets.eval(q))

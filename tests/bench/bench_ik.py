@@ -59,7 +59,7 @@ ROWS = [
 ]
 
 
-def load(row: Row) -> armkin.Arm:
+def arm_of_row(row: Row) -> armkin.Arm:
     """The arm of a row, its axes off by up to `off`."""
     arm = armkin.load(ROBOTS / f"{row.name}.yaml")
     if not row.off:
@@ -71,7 +71,7 @@ def load(row: Row) -> armkin.Arm:
     return from_links(link, arm.prismatic, name=f"{row.name}, calibrated")
 
 
-def targets(arm: armkin.Arm, task_name: str | None, q: np.ndarray) -> np.ndarray:
+def targets_of(arm: armkin.Arm, task_name: str | None, q: np.ndarray) -> np.ndarray:
     """Targets that the joint values q reach: (N, m) or (N, 4, 4)."""
     task, _ = solver(arm, task_name)
     T = armkin.fk(arm, q)
@@ -120,25 +120,25 @@ def peer_job(tool: str | None, arm: armkin.Arm, T: np.ndarray) -> tuple[str, Cal
         rows = [j.dh for j in arm.file.joints]
         alpha, a, d = (np.array([getattr(r, key) for r in rows]) for key in ("alpha", "a", "d"))
         robot = DhRobot(np.radians(alpha), a * 1e-3, d * 1e-3)
-        poses = list(_metres(T))
+        poses = list(_in_metres(T))
         return "EAIK", lambda: robot.IK_batched(poses, 1), len(poses)
     if tool == "ssik":
         try:
             from ssik.prebuilt.kinova import jaco2_ik
         except ImportError:
             return None
-        sample = _metres(T)[:300]
+        sample = _in_metres(T)[:300]
         return "ssik prebuilt", lambda: [jaco2_ik.solve(p) for p in sample], len(sample)
     return None
 
 
-def _metres(T: np.ndarray) -> np.ndarray:
+def _in_metres(T: np.ndarray) -> np.ndarray:
     scaled = T.copy()
     scaled[:, :3, 3] *= 1e-3
     return scaled
 
 
-def hits(arm: armkin.Arm, q: np.ndarray, s: armkin.Solutions) -> float:
+def share_found(arm: armkin.Arm, q: np.ndarray, s: armkin.Solutions) -> float:
     """Share of the generating joints found again, to 1e-6 rad."""
     d = s.q - q[:, None, :]
     d = np.where(arm.prismatic, d / arm.reach, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
@@ -156,19 +156,19 @@ def main() -> None:
         print(f"| arm | task | one thread, us/pose | {args.workers} threads | times faster |\n|---|---|---|---|---|")
         for row in ROWS:
             if not args.only or row.name == args.only:
-                print(threaded(row, int(args.poses * row.share), args.workers), flush=True)
+                print(thread_line(row, int(args.poses * row.share), args.workers), flush=True)
         return
     print("| arm | task | method | hit % | branches | us/pose | one pose us | peer | its us/pose | faster | bars |")
     print("|---|---|---|---|---|---|---|---|---|---|---|")
     for row in ROWS:
         if not args.only or row.name == args.only:
-            print(measured(row, int(args.poses * row.share)), flush=True)
+            print(table_line(row, int(args.poses * row.share)), flush=True)
 
 
-def threaded(row: Row, poses: int, workers: int) -> str:
+def thread_line(row: Row, poses: int, workers: int) -> str:
     """One line of the table of threads, by the clock on the wall: wants a quiet machine."""
-    arm = load(row)
-    goal = targets(arm, row.task, random_joints(arm, poses))
+    arm = arm_of_row(row)
+    goal = targets_of(arm, row.task, random_joints(arm, poses))
     armkin.ik(arm, goal, row.task, workers=workers)
     best = [np.inf, np.inf]
     for _ in range(5):
@@ -180,11 +180,11 @@ def threaded(row: Row, poses: int, workers: int) -> str:
     return f"| {arm.name} | {row.task or '-'} | {single:.3f} | {threaded_time:.3f} | {single / threaded_time:.2f} |"
 
 
-def measured(row: Row, poses: int) -> str:
+def table_line(row: Row, poses: int) -> str:
     """One line of the table."""
-    arm = load(row)
+    arm = arm_of_row(row)
     q = random_joints(arm, poses)
-    goal = targets(arm, row.task, q)
+    goal = targets_of(arm, row.task, q)
     solution = armkin.ik(arm, goal, row.task)
     jobs: list[Callable[[], object]] = [lambda: armkin.ik(arm, goal, row.task)]
     peer = peer_job(row.tool, arm, armkin.fk(arm, q[:10_000]))
@@ -204,7 +204,7 @@ def measured(row: Row, poses: int) -> str:
     if row.one:
         bars.append(f"one {row.one:g} us: {'pass' if single <= row.one else 'miss'}")
     return (
-        f"| {arm.name} | {solution.task.name} | {solution.method} | {100 * hits(arm, q, solution):.2f} "
+        f"| {arm.name} | {solution.task.name} | {solution.method} | {100 * share_found(arm, q, solution):.2f} "
         f"| {solution.valid.sum(axis=1).mean():.2f} | {ours:.3f} | {single:.0f} | {peer[0] if peer else '-'} "
         f"| {f'{theirs:.2f}' if peer else '-'} | {f'{theirs / ours:.1f}' if peer else '-'} | {', '.join(bars) or '-'} |"
     )

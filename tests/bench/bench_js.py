@@ -20,7 +20,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 
-from exported_js import ask, differences, goals_of
+from exported_js import ask_module, differences, goals_of
 
 import armkin
 from armkin.errors import UsageError
@@ -87,7 +87,7 @@ def postures(arm: armkin.Arm, random: int, typed: int, seed: int) -> np.ndarray:
     return np.concatenate([rng.uniform(-turn, turn, (random, arm.n)), round_values])
 
 
-def speed(arm: armkin.Arm, folder: Path) -> str:
+def speed_line(arm: armkin.Arm, folder: Path) -> str:
     """Microseconds a target in node and in C."""
     javascript = module(arm)
     general = "general elimination" in javascript.split("export", 1)[0]
@@ -123,17 +123,17 @@ def speed(arm: armkin.Arm, folder: Path) -> str:
     return f"JS {ours:.2f} us, C {theirs:.2f} us, {ours / theirs:.2f} times; {edges.sum()} of {len(edges)} at an edge"
 
 
-def agree(arm: armkin.Arm, folder: Path, seed: int) -> str:
+def agreement_line(arm: armkin.Arm, folder: Path, seed: int) -> str:
     """How many answers differ from Python's, and which."""
     q = postures(arm, 200, 100, seed)
     if spare := redundancy(actual_arm(arm), None):
-        different = _held(arm, folder, q, spare.joint)
+        different = _held_differences(arm, folder, q, spare.joint)
     else:
-        different = differences(arm, ask(arm, folder, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+        different = differences(arm, ask_module(arm, folder, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
     return "\n".join([f"{len(different)} of {len(q)} differ", *(f"    {line}" for line in different)])
 
 
-def _held(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]:
+def _held_differences(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]:
     """`differences` of an arm with a joint to spare, at home and at five more values of it."""
     low, high = max(arm.lower[joint], -np.pi), min(arm.upper[joint], np.pi)
     values = np.append(arm.home[joint], low + (high - low) * np.array([0.13, 0.37, 0.5, 0.71, 0.94]))
@@ -141,7 +141,7 @@ def _held(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) -> list[str]
     near = np.tile(arm.home, (len(q), 1))
     near[:, joint] = q[:, joint]
     targets = armkin.fk(arm, q)
-    answers = ask(arm, folder, q, near, targets)["ik"]
+    answers = ask_module(arm, folder, q, near, targets)["ik"]
     different = []
     for k, value in enumerate(values):
         mine = answers[k :: len(values)]
@@ -160,7 +160,7 @@ def main(words: list[str]) -> None:
         arm = armkin.load(name)
         with tempfile.TemporaryDirectory() as folder:
             try:
-                line = speed(arm, Path(folder)) if seed is None else agree(arm, Path(folder), seed)
+                line = speed_line(arm, Path(folder)) if seed is None else agreement_line(arm, Path(folder), seed)
             except UsageError as error:
                 line = str(error).splitlines()[0]
         print(f"{name:14} {line}", flush=True)

@@ -39,7 +39,7 @@ SAMPLES = 3000
 DEEP = 0.01  # mm
 
 
-def scenes(name: str, rng: np.random.Generator) -> Iterator[Arm]:
+def random_scenes(name: str, rng: np.random.Generator) -> Iterator[Arm]:
     """The arm in random scenes in which it can stand; its own bodies and a floor are always among them."""
     reach = armkin.load(name).reach
     while True:
@@ -204,13 +204,13 @@ class Coal:
         return float(answer.min_distance)
 
 
-def pairs(count: int, rng: np.random.Generator, oracle: bool) -> None:
+def print_pairs(count: int, rng: np.random.Generator, oracle: bool) -> None:
     print("| arm | pairs | overlap | from exact | coal, apart | signs differ |")
     print("|---|---|---|---|---|---|")
     for name in ARMS:
         compared = hit = signs = 0
         worst = coal_error = 0.0
-        for arm in scenes(name, rng):
+        for arm in random_scenes(name, rng):
             held, q = guard(arm), random_joints(arm, rng, 200)
             clearances, exact = held.distances(q), exact_distances(guard(arm), q)
             compared, hit = compared + clearances.size, hit + int((clearances < 0).sum())
@@ -230,7 +230,7 @@ def pairs(count: int, rng: np.random.Generator, oracle: bool) -> None:
 # motions -----------------------------------------------------------------------------------------------------------
 
 
-def motions(count: int, rng: np.random.Generator) -> None:
+def print_motions(count: int, rng: np.random.Generator) -> None:
     """Joint moves from free postures to free ones, through one or two waypoints, each sampled."""
     print("| arm | motions | free | free, hit deeper | deepest mm | refused, none hit | postures: median, most |")
     print("|---|---|---|---|---|---|---|")
@@ -238,7 +238,7 @@ def motions(count: int, rng: np.random.Generator) -> None:
     for name in ARMS:
         count_done = free = wrong = needless = 0
         deepest, looked = 0.0, []
-        for arm in scenes(name, rng):
+        for arm in random_scenes(name, rng):
             held, q = guard(arm), random_joints(arm, rng, 600)
             q = q[held.least_clearances(q)[0] >= 0]
             for a, b in zip(q[0::2][:125], q[1::2][:125], strict=False):
@@ -259,15 +259,15 @@ def motions(count: int, rng: np.random.Generator) -> None:
         print(f"| {name} | {count_done} | {free} | {wrong} | {deepest:.4f} | {needless} | {tally} |", flush=True)
 
 
-def targets(count: int, rng: np.random.Generator) -> None:
+def print_targets(count: int, rng: np.random.Generator) -> None:
     """Targets of random postures: is the best branch free whenever one within limits is?"""
     print("| arm | targets | some branch free | best is not | best hits |")
     print("|---|---|---|---|---|")
     for name in ARMS:
         count_done = with_free = missed = hit = 0
-        for arm in scenes(name, rng):
+        for arm in random_scenes(name, rng):
             q = random_joints(arm, rng, 250)
-            solutions = armkin.ik(arm, goals(arm, q))
+            solutions = armkin.ik(arm, goals_of(arm, q))
             rows = exact_distances(guard(arm), np.nan_to_num(solutions.q.reshape(-1, arm.n)))
             free = ((rows.min(axis=1) >= 0).reshape(solutions.valid.shape)) & solutions.within_limits & solutions.valid
             best = solutions.best
@@ -280,7 +280,7 @@ def targets(count: int, rng: np.random.Generator) -> None:
         print(f"| {name} | {count_done} | {with_free} | {missed} | {hit} |", flush=True)
 
 
-def goals(arm: Arm, q: Array) -> Array:
+def goals_of(arm: Arm, q: Array) -> Array:
     """Targets of the arm's own task."""
     from armkin.forward import fk
     from armkin.inverse.tasks.choose_task import task_for
@@ -311,7 +311,7 @@ BENCH = """keep_out:
 """
 
 
-def speed() -> None:
+def print_speed() -> None:
     print("| arm, with self, floor, three boxes | C us | numpy us |")
     print("|---|---|---|")
     rng = np.random.default_rng(1)
@@ -326,10 +326,10 @@ def speed() -> None:
         fast.clearance(q)
         c, plain = best_time(lambda: fast.clearance(q)), best_time(lambda: armkin.clearance(arm, q))
         print(f"| {name} | {c / len(q) * 1e6:.2f} | {plain / len(q) * 1e6:.2f} |", flush=True)
-    _path()
+    _print_path()
 
 
-def _path() -> None:
+def _print_path() -> None:
     """A path of 10,000 samples on a bench, proved."""
     for name in ("three_dof", "ur5e", "ar4"):
         arm = armkin.load(name, scene=f"examples/scenes/{name}.yaml")
@@ -342,7 +342,7 @@ def _path() -> None:
             q = q[mm > 10]
             if len(q) < 13:
                 continue
-            way = _curve(arm, np.concatenate([q[:1], q[:1] + 0.25 * (q[1:13] - q[:1])]))
+            way = _curve_through(arm, np.concatenate([q[:1], q[:1] + 0.25 * (q[1:13] - q[:1])]))
             proof = prove_trajectory(way, tight=True)
             if proof is not None and proof.free:
                 break
@@ -351,7 +351,7 @@ def _path() -> None:
         print(f"{name}: a path of 10,000 samples proved in {took * 1e3:.1f} ms, {proof.postures} postures")
 
 
-def _curve(arm: Arm, corners: Array) -> Trajectory:
+def _curve_through(arm: Arm, corners: Array) -> Trajectory:
     """One curve of 10,000 cells through postures: smooth between them."""
     from armkin.motion.timing.cubic_knots import Knots
     from armkin.motion.timing.curved_stretch import Curve
@@ -375,14 +375,14 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     if arguments.pairs:
-        pairs(arguments.pairs, np.random.default_rng(arguments.seed), not arguments.no_coal)
+        print_pairs(arguments.pairs, np.random.default_rng(arguments.seed), not arguments.no_coal)
     if arguments.motions:
-        motions(arguments.motions, np.random.default_rng(arguments.seed))
+        print_motions(arguments.motions, np.random.default_rng(arguments.seed))
     if arguments.targets:
-        targets(arguments.targets, np.random.default_rng(arguments.seed))
+        print_targets(arguments.targets, np.random.default_rng(arguments.seed))
     if arguments.speed:
         os.environ.setdefault("OMP_NUM_THREADS", "1")
-        speed()
+        print_speed()
 
 
 if __name__ == "__main__":

@@ -11,22 +11,22 @@ from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "engines"))
-from kills import Cluster, batch, digest, disturbed, rows
+from kills import Cluster, begin_batch, disturb_batch, file_digest, write_rows
 
 ROWS = 200_000  # seven parts
 
 
-def alike(folder: Path, source: Path, expected: str, ending: str) -> bool:
+def engines_agree(folder: Path, source: Path, expected: str, ending: str) -> bool:
     """Bytes of the engines."""
     good = True
     for name, more in {"pool of 2": ["--workers", "2"], "Dask, 1 worker": [], "Dask, 2 workers": []}.items():
         cluster = Cluster(folder, 1 + name.endswith("2 workers")) if not more else None
         target = folder / f"other.{ending}"
-        process = batch(source, target, *(more if cluster is None else ["--cluster", cluster.address]))
+        process = begin_batch(source, target, *(more if cluster is None else ["--cluster", cluster.address]))
         process.communicate()
         if cluster is not None:
             cluster.close()
-        same = digest(target) == expected
+        same = file_digest(target) == expected
         print(f"{name}: {'the same bytes as one process' if same else 'OTHER BYTES'}", flush=True)
         good &= same
     return good
@@ -41,18 +41,18 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         source, undisturbed = folder / "in.csv", folder / f"one.{ending}"
-        rows(source, ROWS)
-        process = batch(source, undisturbed)
+        write_rows(source, ROWS)
+        process = begin_batch(source, undisturbed)
         _, err = process.communicate()
         if process.returncode not in (0, 3):
             raise subprocess.CalledProcessError(process.returncode, "armkin", stderr=err)
-        expected = digest(undisturbed)
+        expected = file_digest(undisturbed)
         if victim == "alike":
-            return 0 if alike(folder, source, expected, ending) else 1
+            return 0 if engines_agree(folder, source, expected, ending) else 1
         good = early = redone = 0
         cluster = Cluster(folder, 2)
         for i in range(kills):
-            run = disturbed(source, folder / f"out{i}.{ending}", expected, victim, cluster, rng, ROWS // 32_768)
+            run = disturb_batch(source, folder / f"out{i}.{ending}", expected, victim, cluster, rng, ROWS // 32_768)
             good += run.same
             early += run.killed
             redone += run.redone

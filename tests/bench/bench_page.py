@@ -28,7 +28,7 @@ sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
 
 from browsing import chromium  # noqa: E402
 from playwright.sync_api import Browser, Page  # noqa: E402
-from served import teaching  # noqa: E402
+from served import run_teach  # noqa: E402
 
 import armkin  # noqa: E402
 from armkin.robot_file import catalogue  # noqa: E402
@@ -105,7 +105,7 @@ class Processor:
         return used
 
 
-def events(page: Page, processor: Processor) -> Slid:
+def slider_events(page: Page, processor: Processor) -> Slid:
     """A slider's events, one after another."""
     rows = []
     for k in range(EVENTS):
@@ -120,20 +120,20 @@ def events(page: Page, processor: Processor) -> Slid:
     return Slid(wall, min(row[0] for row in rows), used, alone, confirmed)
 
 
-def slid(browser: Browser, address: str, amid: list[float]) -> Iterator[Slid]:
+def slide_everywhere(browser: Browser, address: str, amid: list[float]) -> Iterator[Slid]:
     """At home, and at a posture amid the limits [deg | mm]."""
     page = browser.new_page(viewport={"width": 1280, "height": 800})
     page.goto(address)
     page.wait_for_selector("html[data-ready]", timeout=120_000)
     processor = Processor(page)
-    yield events(page, processor)
+    yield slider_events(page, processor)
     page.evaluate(AMID, amid)
     page.wait_for_timeout(5 * PAUSE)
-    yield events(page, processor)
+    yield slider_events(page, processor)
     page.close()
 
 
-def exported(name: str, file: Path) -> float:
+def export_cpu(name: str, file: Path) -> float:
     """Seconds of CPU of the whole process that writes the file."""
     began = getrusage(RUSAGE_CHILDREN)
     command = [sys.executable, "-m", "armkin", "export", name, "--html", "-o", str(file)]
@@ -142,7 +142,7 @@ def exported(name: str, file: Path) -> float:
     return ended.ru_utime + ended.ru_stime - began.ru_utime - began.ru_stime
 
 
-def measure(browser: Browser, name: str, folder: Path) -> None:
+def print_arm(browser: Browser, name: str, folder: Path) -> None:
     """One arm's rows."""
     arm = armkin.load(name)
     shares = [0.62 - 0.07 * i for i in range(arm.n)]
@@ -152,14 +152,14 @@ def measure(browser: Browser, name: str, folder: Path) -> None:
     amid = [v if slides else math.degrees(v) for v, slides in zip(values, arm.prismatic, strict=True)]
     file = folder / f"{name}.html"
     try:
-        wrote = min(exported(name, file) for _ in range(2))
-        file_rows = list(slid(browser, file.as_uri(), amid))
+        wrote = min(export_cpu(name, file) for _ in range(2))
+        file_rows = list(slide_everywhere(browser, file.as_uri(), amid))
         size = f"{file.stat().st_size / 1e6:.2f} MB {len(gzip.compress(file.read_bytes())) / 1e3:.0f} kB {wrote:.2f} s"
     except subprocess.CalledProcessError as error:
         print(f"{name:14} {error.stderr.decode().strip().splitlines()[0]}", flush=True)
         return
-    with teaching(name) as address:
-        served = list(slid(browser, address, amid))
+    with run_teach(name) as address:
+        served = list(slide_everywhere(browser, address, amid))
     print(f"{name:14} {size}", flush=True)
     for place, k in (("home", 0), ("amid limits", 1)):
         for page, rows in (("file", file_rows), ("served", served)):
@@ -174,5 +174,5 @@ if __name__ == "__main__":
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     with chromium() as one, tempfile.TemporaryDirectory() as place:
         for each in sys.argv[1:] or catalogue.robot_names():
-            measure(one, each, Path(place))
+            print_arm(one, each, Path(place))
     print(f"load {os.getloadavg()[0]:.1f}; the fixed loop at best {Processor.best:.1f} ms")

@@ -40,7 +40,7 @@ SIX = ("three_dof", "irb2400", "puma560", "ar4", "labvolt_5150", "ur5e")
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "parol6", "ra02")
 
 
-def moving(name: str) -> armkin.Arm:
+def arm_with_rates(name: str) -> armkin.Arm:
     """An arm with rates, ours where its file has none."""
     arm = armkin.load(name)
     unit = np.where(arm.prismatic, 5.0, np.pi / 180)
@@ -56,11 +56,11 @@ def planned_along(arm: armkin.Arm, ends: np.ndarray) -> PathPlan | None:
         return None
 
 
-def branches(lines: int) -> None:
+def print_branches(lines: int) -> None:
     """Reach, runs, worst tip deviation and cost of the ladder."""
     print("arm            lines  whole  reach differs (worst/mm)  runs differ  worst dev/um  ladder us/pt  ik us/pt")
     for name in ARMS:
-        arm, rng = moving(name), np.random.default_rng(7)
+        arm, rng = arm_with_rates(name), np.random.default_rng(7)
         carried = differ = unlike_runs = 0
         reach_error = worst = spent = ik_seconds = 0.0
         for _ in range(lines):
@@ -72,12 +72,12 @@ def branches(lines: int) -> None:
                 (columns.s[c.carries_to(0)] for c in chains if c.first == 0 and c.carries_to(0) >= 0), default=-1.0
             )
             carried += mine >= way.length - 1e-9
-            apart = abs(mine - brute.zoomed(arm, way.targets, dense, 0.05))
+            apart = abs(mine - brute.reach_length(arm, way.targets, dense, 0.05))
             reach_error, differ = max(reach_error, apart), differ + (apart > 0.01)
             length = [columns.s[run.last] - columns.s[run.first] for run in fewest_runs(chains, len(columns.s))]
             for finer_by in (1, 10):  # a run that is shorter than their step is none to the samples
                 s = np.linspace(0, way.length, 1000 * finer_by + 1)
-                unlike = sum(x > s[1] for x in length) != len(brute.runs(arm, way.targets(s), 0.05))
+                unlike = sum(x > s[1] for x in length) != len(brute.fewest_runs(arm, way.targets(s), 0.05))
                 if not unlike:
                     break
             unlike_runs += unlike
@@ -113,11 +113,11 @@ def tips_off(arm: armkin.Arm, chains: list[Chain]) -> float:
     return worst
 
 
-def tips(lines: int) -> None:
+def print_tips(lines: int) -> None:
     """The tip between samples on many lines, few samples each: every chain, and what is planned of those carried."""
     print("arm            lines  chains' steps  beyond 0.05 mm  worst dev/um  planned  beyond  worst/um")
     for name in SIX:
-        arm, rng = moving(name), np.random.default_rng(31)
+        arm, rng = arm_with_rates(name), np.random.default_rng(31)
         lines_each = -(-lines // len(SIX))
         steps = beyond = planned = wrong = 0
         worst = far = 0.0
@@ -151,11 +151,11 @@ def tips(lines: int) -> None:
         )
 
 
-def chosen(lines: int) -> None:
+def print_chosen(lines: int) -> None:
     """The chosen branch's time against the fastest of all that carry the line; executed at 1 ms."""
     print("arm            planned  chosen/best  speed   accel   (executed at 1 ms, shares of the limits)")
     for name in ARMS:
-        arm, rng = moving(name), np.random.default_rng(7)
+        arm, rng = arm_with_rates(name), np.random.default_rng(7)
         ratio = speed = accel = 0.0
         planned = 0
         for _ in range(lines):
@@ -176,7 +176,7 @@ def chosen(lines: int) -> None:
         print(f"{name:14} {planned:7d} {ratio:12.5f} {speed:7.4f} {accel:7.4f}", flush=True)
 
 
-def laws(splines: int) -> None:
+def print_laws(splines: int) -> None:
     """The law of time on cubic splines against toppra on the same grid: cost and result."""
     try:
         import toppra
@@ -220,7 +220,7 @@ def laws(splines: int) -> None:
             )
 
 
-def straight(moves: int) -> None:
+def print_straight(moves: int) -> None:
     """Straight moves with bounded jerk against ruckig."""
     try:
         import ruckig
@@ -248,15 +248,15 @@ def main() -> None:
     parser.add_argument("--laws", action="store_true", help="the law of time against toppra, and nothing else")
     arguments = parser.parse_args()
     if arguments.laws:
-        laws(arguments.splines)
+        print_laws(arguments.splines)
         return
     if arguments.tips:
-        tips(arguments.tips)
+        print_tips(arguments.tips)
         return
-    straight(2000)
-    laws(arguments.splines)
-    chosen(arguments.lines)
-    branches(arguments.lines)
+    print_straight(2000)
+    print_laws(arguments.splines)
+    print_chosen(arguments.lines)
+    print_branches(arguments.lines)
 
 
 if __name__ == "__main__":

@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 
 import brute
-from closed_curves import harmonics, on_path
+from closed_curves import harmonic_curve, on_path
 from lines import random_line
 
 import armkin
@@ -38,7 +38,7 @@ CENTRE = np.array([340.0, 40.0, 300.0])
 ARMS = ("three_dof", "irb2400", "puma560", "irb120", "ar4", "labvolt_5150", "ra02")
 
 
-def moving(name: str) -> armkin.Arm:
+def arm_with_rates(name: str) -> armkin.Arm:
     """An arm with rates, ours where its file has none."""
     arm = armkin.load(name)
     unit = np.where(arm.prismatic, 5.0, np.pi / 180)
@@ -46,34 +46,34 @@ def moving(name: str) -> armkin.Arm:
     return replace(arm, max_speed=speed, max_accel=np.where(np.isnan(arm.max_accel), 3 * speed, arm.max_accel))
 
 
-def flat(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+def on_plane(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return np.asarray(CENTRE + np.stack([x, y, 0 * x], axis=1))
 
 
-def shape(name: str, count: int) -> np.ndarray:
+def curve_points(name: str, count: int) -> np.ndarray:
     """Points of a smooth curve, at even steps of its parameter."""
     a = np.linspace(0, 2 * np.pi, count)
     if name == "circle":
-        return flat(50 * np.cos(a), 50 * np.sin(a))
+        return on_plane(50 * np.cos(a), 50 * np.sin(a))
     if name == "spiral":
-        return flat((10 + 5 * a) * np.cos(5 * a), (10 + 5 * a) * np.sin(5 * a))
+        return on_plane((10 + 5 * a) * np.cos(5 * a), (10 + 5 * a) * np.sin(5 * a))
     if name == "lissajous":
-        return flat(60 * np.sin(3 * a), 60 * np.sin(2 * a + 0.9))
+        return on_plane(60 * np.sin(3 * a), 60 * np.sin(2 * a + 0.9))
     if name == "rose":
-        return flat(55 * np.cos(3 * a / 2) * np.cos(a), 55 * np.cos(3 * a / 2) * np.sin(a))
+        return on_plane(55 * np.cos(3 * a / 2) * np.cos(a), 55 * np.cos(3 * a / 2) * np.sin(a))
     if name == "trochoid":
-        return flat(18 * (a - np.pi) - 22 * np.sin(4 * a), 30 - 22 * np.cos(4 * a))
-    return flat(*harmonics(int(name), count).T)
+        return on_plane(18 * (a - np.pi) - 22 * np.sin(4 * a), 30 - 22 * np.cos(4 * a))
+    return on_plane(*harmonic_curve(int(name), count).T)
 
 
-def shapes() -> None:
+def print_shapes() -> None:
     """Time of points beside that of the smooth curve (20,000 points of it), exact and with noise: the worst seed."""
     arm = armkin.load("three_dof")
     print("shape       points  smooth/s  T/smooth: exact  uniform 0.02  Gaussian 0.02   cpu/s  worst point/mm")
     for name in ("circle", "spiral", "lissajous", "rose", "trochoid", *map(str, range(5))):
         count = 1500 if name == "spiral" else 600
-        points, seeds = shape(name, count), [np.random.default_rng(seed) for seed in range(_SEEDS)]
-        smooth = on_path(armkin.path(arm, shape(name, 20_000), corners="tolerance"))
+        points, seeds = curve_points(name, count), [np.random.default_rng(seed) for seed in range(_SEEDS)]
+        smooth = on_path(armkin.path(arm, curve_points(name, 20_000), corners="tolerance"))
         ratios, deviation, spent = [], 0.0, 0.0
         uniform = [rng.uniform(-0.02, 0.02, points.shape) for rng in seeds]
         for noises in ([0 * points], uniform, [rng.normal(0, 0.02, points.shape) for rng in seeds]):
@@ -88,7 +88,7 @@ def shapes() -> None:
               f"{spent:7.2f} {deviation:15.4f}", flush=True)  # fmt: skip
 
 
-def planned(name: str, text: str, place: list[float]) -> None:
+def plan_program(name: str, text: str, place: list[float]) -> None:
     """Read and plan a program; print what it takes."""
     arm = armkin.load("three_dof")
     began = time.process_time()
@@ -103,30 +103,30 @@ def planned(name: str, text: str, place: list[float]) -> None:
     print(f"{name}: {size}: {cost}; worst point {plan.deviation:.4f} mm", flush=True)
 
 
-def slicer(points: int) -> None:
+def slicer_program(points: int) -> None:
     """Layers in a slicer's dialect."""
     script = runpy.run_path(str(Path(__file__).parents[2] / "scripts" / "first_layer.py"))
     lines = "\n".join(script["program"](max(1, round(points / 1110))))
-    planned("slicer's layers", lines, [320, -20, 200])
+    plan_program("slicer's layers", lines, [320, -20, 200])
 
 
-def saw(points: int) -> None:
+def saw_program(points: int) -> None:
     """Lines of 30 mm, 0.4 mm apart, that turn back at every point."""
     lines = [f"G1 X{30 * (k % 2)} Y{0.4 * (k % 75):.1f}" for k in range(points)]
-    planned("saw", "\n".join(["G21 G90 F3000", *lines]), [340, -20, 200])
+    plan_program("saw", "\n".join(["G21 G90 F3000", *lines]), [340, -20, 200])
 
 
-def lines(count: int) -> None:
+def print_lines(count: int) -> None:
     """Lines of 300 mm that begin at a point: planned where some branch carries them, refused where none does."""
     right = carried_count = 0
     for k in range(count):
-        arm, rng = moving(ARMS[k % len(ARMS)]), np.random.default_rng(1000 + k)
+        arm, rng = arm_with_rates(ARMS[k % len(ARMS)]), np.random.default_rng(1000 + k)
         way = random_line(arm, rng)
         ends = way.targets(np.array([0.0, way.length]))
-        carried = brute.zoomed(arm, way.targets, np.linspace(0, way.length, 601), 0.05) == way.length
+        carried = brute.reach_length(arm, way.targets, np.linspace(0, way.length, 601), 0.05) == way.length
         try:
             end = armkin.path(arm, ends).motion.end
-            distance = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _place(ends[1])[:2])
+            distance = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _position(ends[1])[:2])
             planned = bool(distance < 0.01)
         except armkin.NoSolutionError:
             planned = False
@@ -136,30 +136,30 @@ def lines(count: int) -> None:
     print(f"lines from a point: {right} of {count} right; {carried_count} are carried")
 
 
-def _place(target: np.ndarray) -> np.ndarray:
+def _position(target: np.ndarray) -> np.ndarray:
     return np.asarray(target[:3, 3] if target.ndim == 2 else target)
 
 
-def homes(names: list[str]) -> None:
+def print_homes(names: list[str]) -> None:
     """Arms whose home is singular, every shipped one if none is named: carried, turned at rest, or not to be done."""
     print("arm               carried  at rest  refused  false sentences")
     for name in names or catalogue.robot_names():
-        arm = moving(name)
+        arm = arm_with_rates(name)
         if arm.n != 6 or condition(arm, arm.home) < 1e9:
             continue
         tally = [0, 0, 0, 0]
         for way in np.concatenate([20 * np.eye(3), -20 * np.eye(3)]):
             moves: dict[str, object] = {"start": "home", "moves": [{"offset": {"xyz": way.tolist()}}]}
-            kind = _tried(arm, moves)
+            kind = _outcome(arm, moves)
             T = np.tile(armkin.fk(arm, arm.home), (201, 1, 1))
             T[:, :3, 3] += np.linspace(0, 1, 201)[:, None] * way
-            alive = brute.carried(arm, T, 0.05, start=arm.home[None])
+            alive = brute.carried_nodes(arm, T, 0.05, start=arm.home[None])
             tally[kind] += 1
             tally[3] += (kind == 0) != (len(alive) == len(T))
         print(f"{name:18} {tally[0]:6d} {tally[1]:8d} {tally[2]:8d} {tally[3]:16d}", flush=True)
 
 
-def _tried(arm: armkin.Arm, moves: dict[str, object]) -> int:
+def _outcome(arm: armkin.Arm, moves: dict[str, object]) -> int:
     """0: carried; 1: with the wrist turned at rest; 2: not at all."""
     for split in (False, True):
         try:
@@ -180,15 +180,15 @@ def main() -> None:
     arguments = parser.parse_args()
     every = arguments.homes is None and not any(vars(arguments).values())
     if arguments.shapes or every:
-        shapes()
+        print_shapes()
     if arguments.slicer or every:
-        slicer(arguments.slicer or 10_000)
+        slicer_program(arguments.slicer or 10_000)
     if arguments.saw or every:
-        saw(arguments.saw or 1000)
+        saw_program(arguments.saw or 1000)
     if arguments.lines or every:
-        lines(arguments.lines or 14)
+        print_lines(arguments.lines or 14)
     if arguments.homes is not None or every:
-        homes(arguments.homes or [])
+        print_homes(arguments.homes or [])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,7 @@ import armkin
 from armkin.forward import tip_and_jacobian
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
-from test_position_first import ARMS, targets  # noqa: E402
+from test_position_first import ARMS, random_targets  # noqa: E402
 
 GRID = {1: 200, 2: 28}  # values of each joint but the first three, by how many these are
 STARTS = {1: 16, 2: 8}
@@ -28,7 +28,7 @@ ROUNDS = 34
 WORSE = np.deg2rad(1e-6)
 
 
-def onto(arm: armkin.Arm, q: np.ndarray, p: np.ndarray, steps: int) -> np.ndarray:
+def move_onto(arm: armkin.Arm, q: np.ndarray, p: np.ndarray, steps: int) -> np.ndarray:
     """Postures (M, n) with the first three joints moved to where the tool is at p [mm]."""
     unit = np.where(arm.prismatic[:3], arm.reach, 1.0)
     q, nudge = q.copy(), arm.reach * 1e-9 * np.random.default_rng(0).normal(size=(3, 3))
@@ -39,7 +39,7 @@ def onto(arm: armkin.Arm, q: np.ndarray, p: np.ndarray, steps: int) -> np.ndarra
     return q
 
 
-def judged(arm: armkin.Arm, q: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def angles_and_copies(arm: armkin.Arm, q: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The angle to a target (M,) [rad], infinite beyond limits and beside its position; the nearest copies (M, n)."""
     wrapped = np.where(arm.prismatic, q, q - 2 * np.pi * np.rint(q / (2 * np.pi)))
     for turn in (2 * np.pi, -2 * np.pi):
@@ -59,7 +59,7 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, rng: np.random.Generator) -> 
     axes = [np.linspace(a, b, GRID[free]) for a, b in zip(low[3:], high[3:], strict=True)]
     free_values = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, free).repeat(STARTS[free], axis=0)
     q = np.concatenate([rng.uniform(low[:3], high[:3], (len(free_values), 3)), free_values], axis=1)
-    angle, q = judged(arm, onto(arm, q, T[:3, 3], 14), T)
+    angle, q = angles_and_copies(arm, move_onto(arm, q, T[:3, 3], 14), T)
     stencil = np.stack(np.meshgrid(*[np.linspace(-1.0, 1.0, 5)] * free, indexing="ij"), axis=-1).reshape(-1, free)
     size, count = (high - low)[3:] / (GRID[free] - 1), BEST[0]
     for k in range(ROUNDS):
@@ -67,7 +67,7 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, rng: np.random.Generator) -> 
         angle, q = angle[best], q[best]
         beside = q.repeat(len(stencil), axis=0)
         beside[:, 3:] = np.clip(beside[:, 3:] + np.tile(stencil * size, (len(q), 1)), low[3:], high[3:])
-        angles, beside = judged(arm, onto(arm, beside, T[:3, 3], 4 if k < 6 else 2), T)
+        angles, beside = angles_and_copies(arm, move_onto(arm, beside, T[:3, 3], 4 if k < 6 else 2), T)
         angles = angles.reshape(len(q), -1)
         place, rows = angles.argmin(axis=1), np.arange(len(q))
         better = angles[rows, place] < angle
@@ -85,7 +85,7 @@ def main() -> None:
     print("arm            targets  ms each  worse  equal to 1e-6 deg  brute force worse, deg at most  position off, mm")
     for name in names:
         arm = armkin.load(name)
-        T = targets(arm, max(1_000, first + count), 7)[first : first + count]
+        T = random_targets(arm, max(1_000, first + count), 7)[first : first + count]
         start = time.process_time()
         s = armkin.ik(arm, T, "pose", position_first=True)
         spent = (time.process_time() - start) / count

@@ -23,7 +23,7 @@ TEN = ["ur5e", "puma560", "ar4", "three_dof", "stanford", "planar_3dof", "so101"
 TEN += ["jaco_j2n6s300"]
 
 
-def speed() -> bool:
+def meets_speed_bar() -> bool:
     """10^9 poses: 90 azimuths, 72 rolls, no measures; the grid that gives so many."""
     good = True
     for name in ("ur5e", "puma560", "ar4"):
@@ -53,8 +53,8 @@ def keep_outs() -> bool:
         words = [sys.executable, "-m", "armkin", "info", name, "--scene", str(scene), "--json"]
         answer = json.loads(subprocess.run(words, capture_output=True, check=True).stdout)
         arm = armkin.load(name, scene=scene)
-        cells = monte_carlo.cells(arm, scene, answer, grid=grid, count=count, starts=starts)
-        volume = monte_carlo.volume(arm, scene, answer, grid=grid / 2, count=count, starts=starts)
+        cells = monte_carlo.count_cells(arm, scene, answer, grid=grid, count=count, starts=starts)
+        volume = monte_carlo.count_volume(arm, scene, answer, grid=grid / 2, count=count, starts=starts)
         good &= cells.different == 0 and abs(volume.map - volume.counted) < 4 * volume.sigma
         print(f"{name:10}{cells.different} of {count} cells differ, {cells.known:.1%} could be told")
         shares = f"{volume.map:.3f} by the map, {volume.counted:.3f} +- {volume.sigma:.3f} counted"
@@ -62,7 +62,7 @@ def keep_outs() -> bool:
     return good
 
 
-def place(solve: Any = armkin.ik) -> bool:
+def places_agree(solve: Any = armkin.ik) -> bool:
     """400 poses from 37 x 37 places and 72 yaws, every shipped arm with a closed form; 1,000 places asked directly."""
     from armkin.inverse.solvers.recognise import solver
     from armkin.inverse.tasks.task import targets_of
@@ -96,14 +96,14 @@ def place(solve: Any = armkin.ik) -> bool:
     return total <= PLACE and not different
 
 
-def compiled() -> bool:
+def compiled_agrees() -> bool:
     """The same by machine code."""
     from armkin.cli import compiled_ik
 
-    return place(compiled_ik.ik)
+    return places_agree(compiled_ik.ik)
 
 
-def unseen(seed: int = 1, poses: int = 10**6) -> bool:
+def cells_agree(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
     from armkin.reachability.cell_answers import TURN, Question, cell_columns
     from armkin.reachability.reach_cells import Grid
@@ -138,9 +138,9 @@ def unseen(seed: int = 1, poses: int = 10**6) -> bool:
     return not different
 
 
-PARTS = {"speed": speed, "keep_outs": keep_outs, "place": place, "compiled": compiled}
+PARTS = {"speed": meets_speed_bar, "keep_outs": keep_outs, "place": places_agree, "compiled": compiled_agrees}
 
 if __name__ == "__main__":
     if sys.argv[1:2] == ["unseen"]:
-        sys.exit(0 if unseen(*map(int, sys.argv[2:4])) else 1)
+        sys.exit(0 if cells_agree(*map(int, sys.argv[2:4])) else 1)
     sys.exit(0 if all(PARTS[name]() for name in sys.argv[1:] or PARTS) else 1)

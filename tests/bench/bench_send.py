@@ -32,7 +32,7 @@ ROBOT = Path(__file__).parents[2] / "robots" / "three_dof.yaml"
 SEGMENTS = 1000
 
 
-def noisy(seed: int) -> str:
+def noisy_line(seed: int) -> str:
     """One run; a line of the table."""
     arm = arms.load_arm(ROBOT)
     rng = np.random.default_rng(seed)
@@ -79,7 +79,7 @@ def main() -> None:
     seeds = range(1, 21) if len(sys.argv) < 2 else [int(word) for word in sys.argv[1].split(",")]
     print("seed  segments  motion  (noise 1 % flips + 1 % drops, both ways)")
     with ThreadPoolExecutor(2) as pool:
-        for row in pool.map(noisy, seeds):
+        for row in pool.map(noisy_line, seeds):
             print(row, flush=True)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import armkin
 
 
-def seconds(do: Callable[[], object]) -> float:
+def least_cpu(do: Callable[[], object]) -> float:
     """The least CPU time of two runs."""
     times = []
     for _ in range(2):
@@ -50,10 +50,10 @@ def main() -> None:
             T = armkin.fk(arm, q)
             armkin.ik(arm, T[:64])  # recorded once
             solutions = armkin.ik(arm, T)
-            mean = 1e6 * seconds(lambda T=T: armkin.ik(arm, T)) / arguments.poses  # type: ignore[misc]
-            own_pose = 1e6 * seconds(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / arguments.poses  # type: ignore[misc]
+            mean = 1e6 * least_cpu(lambda T=T: armkin.ik(arm, T)) / arguments.poses  # type: ignore[misc]
+            own_pose = 1e6 * least_cpu(lambda T=T, q=q: armkin.ik(arm, T, near=q)) / arguments.poses  # type: ignore[misc]
             edge = np.flatnonzero(solutions.status != armkin.Status.EXACT)[: arguments.alone]
-            worst = max((seconds(lambda T=T, k=k: armkin.ik(arm, T[k])) for k in edge), default=0.0)  # type: ignore[misc]
+            worst = max((least_cpu(lambda T=T, k=k: armkin.ik(arm, T[k])) for k in edge), default=0.0)  # type: ignore[misc]
             counts = np.bincount(solutions.status, minlength=3)
             print(
                 f"{name} | {arguments.poses} at {kind} | {mean:.0f} | {own_pose:.0f} | {counts[2]}, {counts[1]} "

@@ -24,7 +24,7 @@ from armkin.errors import UsageError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 from exported import Exported
-from exported_js import ask
+from exported_js import ask_module
 
 ARMS = ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia", "ur10e", "xarm6", "kuka_kr6_r700", "thor", "ar4"]
 DIGITS = ["float32", *(f"{digits}{kind}" for kind in "fg" for digits in (6, 7, 8, 9, 10, 12, 14, 16))]
@@ -46,14 +46,14 @@ def postures(arm: armkin.Arm, count: int, rng: np.random.Generator) -> np.ndarra
     return q
 
 
-def rounded(T: np.ndarray, digits: str) -> np.ndarray:
+def round_poses(T: np.ndarray, digits: str) -> np.ndarray:
     """Poses with so many decimals (f) or significant digits (g)."""
     if digits == "float32":
         return T.astype(np.float32)
     return np.array([float(f"{x:.{digits}}") for x in T.ravel()]).reshape(T.shape)
 
 
-def chosen(solve: Callable[..., armkin.Solutions]) -> Best:
+def best_of(solve: Callable[..., armkin.Solutions]) -> Best:
     """The best branch of each target (N, n), nan where there is none."""
 
     def best(T: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -75,7 +75,7 @@ def in_c(code: Exported) -> Best:
 
 def in_js(arm: armkin.Arm, folder: Path) -> Best:
     def best(T: np.ndarray, q: np.ndarray) -> np.ndarray:
-        answers = ask(arm, folder, q, near=q, targets=np.asarray(T, float))["ik"]
+        answers = ask_module(arm, folder, q, near=q, targets=np.asarray(T, float))["ik"]
         nothing = [np.nan] * arm.n
         return np.array(
             [nothing if answer["best"] is None else answer["branches"][answer["best"]]["joints"] for answer in answers]
@@ -97,8 +97,8 @@ def main() -> None:
         fast = armkin.compile(armkin.load(name))
         q = postures(arm, arguments.poses, rng)
         with tempfile.TemporaryDirectory() as folder:
-            ways: dict[str, Best] = {"numpy": chosen(lambda T, near, arm=arm: armkin.ik(arm, T, near=near)),
-                                     "compiled": chosen(fast.ik)}  # fmt: skip
+            ways: dict[str, Best] = {"numpy": best_of(lambda T, near, arm=arm: armkin.ik(arm, T, near=near)),
+                                     "compiled": best_of(fast.ik)}  # fmt: skip
             for words, single in (("C", False), ("C float", True)):
                 try:
                     ways[words] = in_c(Exported(arm, Path(tempfile.mkdtemp(dir=folder)), single))  # a library a folder
@@ -110,7 +110,7 @@ def main() -> None:
                 T = armkin.fk(arm, standing)
                 moved, worst = {}, 0.0
                 for digits in DIGITS:
-                    motion = np.abs(best(rounded(T, digits), standing) - standing).max(axis=1)
+                    motion = np.abs(best(round_poses(T, digits), standing) - standing).max(axis=1)
                     moved[digits] = int((~(motion <= MOVES)).sum())
                     worst = max(worst, float(np.nan_to_num(motion, nan=np.inf).max()))
                 moved_text = ", ".join(f"{count} at {digits}" for digits, count in moved.items() if count)

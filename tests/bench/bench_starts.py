@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 from armkin.errors import NoSolutionError
-from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Result, carried_out, on
+from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Result, carried_out, simulated_kind
 
 NUMBERS = range(1, len(ELSEWHERE) + 1)
 Paths = dict[str, dict[str, Any]]
@@ -47,22 +47,22 @@ def main() -> int:
         moves.pop("robot", None)
     good = True
     for kind in arguments.kinds or ([] if arguments.pins else KINDS):
-        kind_of_board = on(kind)
-        good &= driven(
+        kind_of_board = simulated_kind(kind)
+        good &= all_driven(
             kind, partial(carried_out, kind_of_board), paths, places, kind_of_board.tolerance, kind_of_board.rest
         )
     if arguments.pins:
         from emulator import EmulatedBoard
-        from starts_on_pins import sent
+        from starts_on_pins import send_path_from
 
         for moves in paths.values():
             moves["moves"] = [m for m in moves["moves"] if "grip" not in m]
         with EmulatedBoard(trace=True) as board, tempfile.TemporaryDirectory() as folder:
-            good &= driven("emulated Uno", partial(sent, board, Path(folder)), paths, places, 0.4, 0)
+            good &= all_driven("emulated Uno", partial(send_path_from, board, Path(folder)), paths, places, 0.4, 0)
     return not good
 
 
-def driven(
+def all_driven(
     kind: str, send: Callable[..., Result], paths: Paths, places: Places, tolerance: float, most_rest: int
 ) -> bool:
     """Send every path from every place and print what was found so far; whether all were driven where they are."""

@@ -18,7 +18,7 @@ COMMANDS = {
 }
 
 
-def seconds(command: list[str]) -> float:
+def run_seconds(command: list[str]) -> float:
     began = time.perf_counter()
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     return time.perf_counter() - began
@@ -28,8 +28,8 @@ def main(pairs: int) -> None:
     nothing = [sys.executable, "-c", "pass"]
     print(f"{'':16}  {'pass/ms':>8}  {'ms':>7}  {'ratio':>6}  {'of best':>7}  bar")
     for name, (command, bar) in COMMANDS.items():
-        seconds(command)  # compiled files and the disk's cache
-        times = [(seconds(nothing), seconds(command)) for _ in range(pairs)]
+        run_seconds(command)  # compiled files and the disk's cache
+        times = [(run_seconds(nothing), run_seconds(command)) for _ in range(pairs)]
         bare, full = (statistics.median(column) * 1e3 for column in zip(*times, strict=True))
         ratio = statistics.median(b / a for a, b in times)
         best = min(b for _, b in times) / min(a for a, _ in times)

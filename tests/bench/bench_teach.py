@@ -52,7 +52,7 @@ DRAWN = """() => {
 
 
 @contextmanager
-def teaching(robot: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
+def run_teach(robot: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
     """The process, its address, and when it was started."""
     began = time.perf_counter()
     command = [sys.executable, "-m", "armkin", "teach", robot, "--no-open"]
@@ -65,15 +65,15 @@ def teaching(robot: str) -> Iterator[tuple[subprocess.Popen[str], str, float]]:
         process.communicate()
 
 
-def cpu(process: subprocess.Popen[str]) -> float:
+def process_cpu(process: subprocess.Popen[str]) -> float:
     """Seconds of CPU that a process has used (Linux)."""
     fields = Path(f"/proc/{process.pid}/stat").read_text().rsplit(")", 1)[1].split()
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def events(robot: str) -> None:
+def print_events(robot: str) -> None:
     """Drag events without a browser."""
-    with teaching(robot) as (process, address, _):
+    with run_teach(robot) as (process, address, _):
         base, key = address.split("/#")
         host = base.removeprefix("http://")
         line = http.client.HTTPConnection(host)
@@ -91,20 +91,20 @@ def events(robot: str) -> None:
         news.request("GET", f"/events?tab={tab}")
         stream = news.getresponse()
         held = [arm["lock"]] if arm["lock"] else []
-        q = POSES.get(robot) or [_inside(joint, 0.62 - 0.07 * i) for i, joint in enumerate(arm["joints"])]
+        q = POSES.get(robot) or [_value_within(joint, 0.62 - 0.07 * i) for i, joint in enumerate(arm["joints"])]
         target = act("look", tab, q=q, held=held).get("target")
         if target is None:
             print(f"{robot:14} has no task")
             return
         rounds = []
         for _ in range(ROUNDS if robot not in POSES else 3):
-            times, begun = [], cpu(process)
+            times, begun = [], process_cpu(process)
             for k in range(EVENTS):
                 moved = [target[0] + 10 * math.sin(k / 20), target[1] + 5 * math.cos(k / 15), *target[2:]]
                 since = time.perf_counter()
                 branch_count = len(act("look", tab, q=q, target=moved, held=held, nearest=False)["branches"])
                 times.append(time.perf_counter() - since)
-            rounds.append(((cpu(process) - begun) / EVENTS, statistics.median(times)))
+            rounds.append(((process_cpu(process) - begun) / EVENTS, statistics.median(times)))
             time.sleep(PAUSE)
         stream.close()
         used, median = min(rounds)
@@ -112,17 +112,17 @@ def events(robot: str) -> None:
         print(f"{robot:14} {branch_count} branches: {spent}, {1e3 * median:.2f} ms to the answer", flush=True)
 
 
-def _inside(joint: dict[str, Any], share: float) -> float:
+def _value_within(joint: dict[str, Any], share: float) -> float:
     low, high = (joint["lower"] or -180.0, joint["upper"] or 180.0)
     return float(low + share * (high - low))
 
 
-def starts(robot: str, browser: Browser) -> None:
+def print_starts(robot: str, browser: Browser) -> None:
     """From the command to the first picture, in a browser that runs already and has an empty page open."""
     seconds = []
     for _ in range(STARTS):
         view = browser.new_page(viewport=WINDOW)
-        with teaching(robot) as (_, address, began):
+        with run_teach(robot) as (_, address, began):
             view.goto(address, wait_until="commit")
             view.wait_for_selector("html[data-ready]", state="attached")
             view.evaluate(DRAWN)
@@ -131,9 +131,9 @@ def starts(robot: str, browser: Browser) -> None:
     print(f"{robot:10} command to first picture: median {statistics.median(seconds):.2f} s, best {min(seconds):.2f} s")
 
 
-def drags(robot: str, browser: Browser) -> None:
+def print_drags(robot: str, browser: Browser) -> None:
     """Drag the handle in a browser."""
-    with teaching(robot) as (_, address, _):
+    with run_teach(robot) as (_, address, _):
         view = browser.new_page(viewport=WINDOW)
         view.goto(address)
         view.wait_for_selector("html[data-ready]")
@@ -165,9 +165,9 @@ def drags(robot: str, browser: Browser) -> None:
 if __name__ == "__main__":
     print(f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores")
     for name in sys.argv[1:] or catalogue.robot_names():
-        events(name)
+        print_events(name)
     with chromium() as one:
         for name in POSES:
             if not sys.argv[1:] or name in sys.argv[1:]:
-                starts(name, one)
-                drags(name, one)
+                print_starts(name, one)
+                print_drags(name, one)

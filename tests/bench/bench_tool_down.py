@@ -11,13 +11,13 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from bench_batches import c_alone, least
+from bench_batches import c_alone, least_cpu
 
 import armkin
 
 sys.path += [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
 
-from test_tool_down import known  # of the inverse tests
+from test_tool_down import arm_and_screws  # of the inverse tests
 
 ARMS = ("jaco_j2n6s300", "gen3_lite", "fanuc_crx10ia", "xarm6", "mycobot_280")
 WAYS = {"up": (0, 0, 1), "down": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}
@@ -40,17 +40,17 @@ def main() -> None:
     count = int(sys.argv[1]) if len(sys.argv) > 1 else 1_000
     print("arm            way   compiled us  C alone us  numpy us  alone ms, median / worst  complete, C / numpy")
     for name in ARMS:
-        arm = known(name)[0]
+        arm = arm_and_screws(name)[0]
         fast = armkin.compile(arm)
         for label, way in WAYS.items():
             T = targets(arm, way, count)
             sample = T[: max(count // 4, 1)]
             armkin.ik(arm, T[:2])
             python, compiled = armkin.ik(arm, sample), fast.ik(T)
-            quick = 1e6 * least(lambda T=T: fast.ik(T), RUNS) / count  # type: ignore[misc]
+            quick = 1e6 * least_cpu(lambda T=T: fast.ik(T), RUNS) / count  # type: ignore[misc]
             inside = 1e6 * min(c_alone(fast, T) for _ in range(RUNS)) / count
-            plain = 1e6 * least(lambda sample=sample: armkin.ik(arm, sample)) / len(sample)  # type: ignore[misc]
-            alone = [1e3 * least(lambda goal=goal: armkin.ik(arm, goal)) for goal in T[:ALONE]]  # type: ignore[misc]
+            plain = 1e6 * least_cpu(lambda sample=sample: armkin.ik(arm, sample)) / len(sample)  # type: ignore[misc]
+            alone = [1e3 * least_cpu(lambda goal=goal: armkin.ik(arm, goal)) for goal in T[:ALONE]]  # type: ignore[misc]
             print(
                 f"{name:14s} {label:5s} {quick:11.1f} {inside:11.1f} {plain:9.0f} {np.median(alone):12.2f} / "
                 f"{max(alone):.2f} {100 * compiled.complete.mean():16.2f} / {100 * python.complete.mean():.2f} %",

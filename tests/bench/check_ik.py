@@ -24,11 +24,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 
 import oracle
 import truth
-from checks import Array, Report, examine, not_found, random_joints
+from checks import Array, Report, examine_answers, not_found, random_joints
 from geometries import CLASSES, random_case, right_angles
-from geometries import case as case_of
-from test_every_branch import NAMES, shipped
-from test_nearly_special import OFF, moved
+from geometries import case_of as case_of
+from test_every_branch import NAMES, shipped_arm
+from test_nearly_special import OFF, move_axes
 
 import armkin
 from armkin.errors import UsageError
@@ -38,7 +38,7 @@ from armkin.model.arm import Arm
 HEAD = "method | poses | lost | branches | mm | deg | twice | us/pose"
 
 
-def row(name: str, reports: list[Report], seconds: float, extra: str = "") -> None:
+def print_row(name: str, reports: list[Report], seconds: float, extra: str = "") -> None:
     """One line of a table; lost: generating joints that are not among the branches."""
     poses = sum(len(r.q) for r in reports)
     methods = ", ".join(sorted({r.solutions.method for r in reports}))
@@ -52,10 +52,10 @@ def row(name: str, reports: list[Report], seconds: float, extra: str = "") -> No
     )
 
 
-def agreement(reports: list[Report], poses: int = 1000) -> str:
+def peer_agreement(reports: list[Report], poses: int = 1000) -> str:
     """On how many poses the peers find as many branches, where they are installed and can solve the arm."""
     texts = []
-    for name, peer in (("EAIK", eaik), ("ssik", ssik)):
+    for name, peer in (("EAIK", eaik_counter), ("ssik", ssik_counter)):
         same = total = 0
         for report in reports:
             solve = peer(report)
@@ -68,7 +68,7 @@ def agreement(reports: list[Report], poses: int = 1000) -> str:
     return " " + ", ".join(texts) if texts else ""
 
 
-def eaik(report: Report) -> Callable[[Array], int] | None:
+def eaik_counter(report: Report) -> Callable[[Array], int] | None:
     """Its number of branches for poses of six revolute joints, if it knows a decomposition of the arm."""
     try:
         from eaik.IK_HP import HPRobot
@@ -91,7 +91,7 @@ def eaik(report: Report) -> Callable[[Array], int] | None:
     return solve
 
 
-def ssik(report: Report) -> Callable[[Array], int] | None:
+def ssik_counter(report: Report) -> Callable[[Array], int] | None:
     """Its number of branches for the arms that it is shipped with and that are general: Kinova's JACO."""
     try:
         from ssik.prebuilt.kinova import jaco2_ik
@@ -108,17 +108,17 @@ def ssik(report: Report) -> Callable[[Array], int] | None:
     return solve
 
 
-def robots(poses: int, only: str) -> None:
+def check_robots(poses: int, only: str) -> None:
     print(f"\n| shipped robot | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
     for name in NAMES:
         if only in name:
-            arm, screw = shipped(name)
+            arm, screw = shipped_arm(name)
             begin = time.perf_counter()
-            report = examine(arm, screw, None, random_joints(screw, poses, 1))
-            row(name, [report], time.perf_counter() - begin, agreement([report]))
+            report = examine_answers(arm, screw, None, random_joints(screw, poses, 1))
+            print_row(name, [report], time.perf_counter() - begin, peer_agreement([report]))
 
 
-def classes(poses: int, arms: int, only: str) -> None:
+def check_classes(poses: int, arms: int, only: str) -> None:
     print(f"\n| class, {arms} random arms | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
     for name in CLASSES:
         if only in name:
@@ -126,20 +126,20 @@ def classes(poses: int, arms: int, only: str) -> None:
             for seed in range(arms):
                 case = random_case(name, seed)
                 q = random_joints(case.screw, max(poses // arms, 1), seed)
-                reports.append(examine(case.arm, case.screw, case.task, q))
-            row(name, reports, time.perf_counter() - begin, agreement(reports))
+                reports.append(examine_answers(case.arm, case.screw, case.task, q))
+            print_row(name, reports, time.perf_counter() - begin, peer_agreement(reports))
 
 
-def near(poses: int, only: str) -> None:
+def check_near_classes(poses: int, only: str) -> None:
     print(f"\n| class, off by | {HEAD} |\n|---|---|---|---|---|---|---|---|---|")
     for name in CLASSES:
         if only in name and "general" not in name:
             for size in OFF:
                 case = random_case(name, 1)
-                arm, screw = moved(case.arm, size, 1)
+                arm, screw = move_axes(case.arm, size, 1)
                 begin = time.perf_counter()
-                report = examine(arm, screw, case.task, random_joints(screw, max(poses, 1), 1))
-                row(f"{name}, {size:.0e}", [report], time.perf_counter() - begin)
+                report = examine_answers(arm, screw, case.task, random_joints(screw, max(poses, 1), 1))
+                print_row(f"{name}, {size:.0e}", [report], time.perf_counter() - begin)
 
 
 def against_oracle(poses: int, arms: int, only: str) -> None:
@@ -152,10 +152,10 @@ def against_oracle(poses: int, arms: int, only: str) -> None:
                 if name in CLASSES:
                     case = random_case(name, seed)
                     q = random_joints(case.screw, max(poses // arms, 1), seed + 1000)
-                    reports.append(examine(case.arm, case.screw, case.task, q))
+                    reports.append(examine_answers(case.arm, case.screw, case.task, q))
                 else:
-                    arm, screw = shipped(name)
-                    reports.append(examine(arm, screw, None, random_joints(screw, max(poses, 1), 2)))
+                    arm, screw = shipped_arm(name)
+                    reports.append(examine_answers(arm, screw, None, random_joints(screw, max(poses, 1), 2)))
             weak = []
             for report in reports:
                 for begin in range(0, len(report.q), 50):
@@ -182,7 +182,7 @@ def asked_arms(only: str, first: int) -> Iterator[tuple[str, Arm, oracle.Screws,
     """
     for name in NAMES:
         if only in name or only == "shipped":
-            yield name, *shipped(name), None, 4096, 1000
+            yield name, *shipped_arm(name), None, 4096, 1000
     for name in CLASSES:
         if only in name or only == "classes":
             case = random_case(name, first)
@@ -197,7 +197,7 @@ def asked_arms(only: str, first: int) -> Iterator[tuple[str, Arm, oracle.Screws,
                 yield f"{RIGHT_ANGLES} {seed}, {method}", made.arm, made.screw, "pose", 500, 500
 
 
-def asked(
+def print_asked(
     name: str, label: str, arm: Arm, screw: oracle.Screws, task: str | None, q: Array, target: Array, check: int
 ) -> None:
     """A line: what is wrong with the answers to targets made from postures, near home and near the postures.
@@ -220,24 +220,33 @@ def asked(
     )
 
 
-def postures(share: float, seed: int, only: str) -> None:
+def check_postures(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
     for name, arm, screw, task, count, _ in asked_arms(only, seed):
         for step in (90, 45):
             q = truth.round_postures(arm, step, max(int(count * share), 1))
             definition, _ = solver(arm, task)
-            asked(name, f"multiples of {step}", arm, screw, task, q, oracle.goal(definition, screw, q).array(), 25)
+            print_asked(
+                name,
+                f"multiples of {step}",
+                arm,
+                screw,
+                task,
+                q,
+                oracle.goal_of_joints(definition, screw, q).array(),
+                25,
+            )
 
 
-def surfaces(share: float, seed: int, only: str) -> None:
+def check_surfaces(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
     for name, arm, screw, task, _, count in asked_arms(only, seed):
         definition, _ = solver(arm, task)
         for label, q in truth.singular_postures(arm, screw, task, max(int(count * share), 1)).items():
-            asked(name, label, arm, screw, task, q, oracle.goal(definition, screw, q).array(), 5)
+            print_asked(name, label, arm, screw, task, q, oracle.goal_of_joints(definition, screw, q).array(), 5)
 
 
-def leaving(share: float, seed: int, only: str) -> None:
+def check_leaving(share: float, seed: int, only: str) -> None:
     """Postures beside singular surfaces, and on them, but their poses rounded."""
     print(f"\n{ASKED}")
     for name, arm, screw, task, _, count in asked_arms(only, seed):
@@ -246,24 +255,26 @@ def leaving(share: float, seed: int, only: str) -> None:
         q, rng = np.concatenate([np.zeros((0, arm.n)), *surfaces.values()]), np.random.default_rng(seed)
         way = rng.uniform(0.3, 1.0, q.shape) * rng.choice([-1.0, 1.0], q.shape)
         way *= 10.0 ** rng.uniform(-12, -2, (len(q), 1)) * np.where(arm.prismatic, arm.reach, 1.0)
-        beside = oracle.goal(definition, screw, q + way).array()
-        asked(name, "off by 1e-12 to 1e-2", arm, screw, task, q + way, beside, 5)
-        target = oracle.goal(definition, screw, q).array()
+        beside = oracle.goal_of_joints(definition, screw, q + way).array()
+        print_asked(name, "off by 1e-12 to 1e-2", arm, screw, task, q + way, beside, 5)
+        target = oracle.goal_of_joints(definition, screw, q).array()
         for digits in (7, 8) if definition.orientation == "full" else ():
-            asked(name, f"{digits} digits, matrices", arm, screw, task, q, truth.printed(target, digits), 5)
+            print_asked(
+                name, f"{digits} digits, matrices", arm, screw, task, q, truth.printed_matrices(target, digits), 5
+            )
 
 
-def rounded(share: float, seed: int, only: str) -> None:
+def check_rounded(share: float, seed: int, only: str) -> None:
     print(f"\n{ASKED}")
     for name, arm, screw, task, _, count in asked_arms(only, seed):
         definition, _ = solver(arm, task)
         q = random_joints(screw, max(int(count * share), 1), 5)
-        target = oracle.goal(definition, screw, q).array()
+        target = oracle.goal_of_joints(definition, screw, q).array()
         for digits in (3, 4, 5, 6, 7, 7.5, 8, 9, 10, 11, 12, 13, 14, 15, 16):
             what = "float32" if digits == 7.5 else f"{digits} digits"
-            asked(name, what, arm, screw, task, q, truth.typed(definition, target, digits), 2)
+            print_asked(name, what, arm, screw, task, q, truth.typed_targets(definition, target, digits), 2)
             if definition.orientation == "full" and digits >= 7:
-                asked(name, f"{what}, matrices", arm, screw, task, q, truth.printed(target, digits), 2)
+                print_asked(name, f"{what}, matrices", arm, screw, task, q, truth.printed_matrices(target, digits), 2)
 
 
 def main() -> None:
@@ -281,15 +292,21 @@ def main() -> None:
     args = parser.parse_args()
     everything = not any(getattr(args, choice) for choice in choices)
     if args.robots or everything:
-        robots(args.poses, args.only)
+        check_robots(args.poses, args.only)
     if args.classes or everything:
-        classes(args.poses, args.arms, args.only)
+        check_classes(args.poses, args.arms, args.only)
     if args.near or everything:
-        near(args.poses // 10, args.only)
+        check_near_classes(args.poses // 10, args.only)
     if args.oracle or everything:
         against_oracle(args.poses // 10, args.arms, args.only)
-    for table in (postures, surfaces, leaving, rounded):
-        if getattr(args, table.__name__) or everything:
+    tables = {
+        "postures": check_postures,
+        "surfaces": check_surfaces,
+        "leaving": check_leaving,
+        "rounded": check_rounded,
+    }
+    for choice, table in tables.items():
+        if getattr(args, choice) or everything:
             table(args.share, args.seed, args.only)
 
 

@@ -82,7 +82,7 @@ MUTANTS = [
 QUICK = ["-m", "not slow and not emulator"]
 
 
-def caught(mutant: Mutant, tree: Path, options: list[str]) -> str | None:
+def catching_test(mutant: Mutant, tree: Path, options: list[str]) -> str | None:
     """The first test that fails in a tree with that error; None: nothing does."""
     path = tree / "src" / "armkin" / mutant.file
     text = path.read_text(encoding="utf-8")
@@ -114,9 +114,9 @@ def main() -> None:
             (tree / "node_modules").symlink_to((ROOT / "node_modules").resolve())
         for number in wanted:
             mutant = MUTANTS[number - 1]
-            by = caught(mutant, tree, QUICK)
+            by = catching_test(mutant, tree, QUICK)
             quick += by is not None
-            if by is None and (by := caught(mutant, tree, ["-m", "slow and not emulator"])) is not None:
+            if by is None and (by := catching_test(mutant, tree, ["-m", "slow and not emulator"])) is not None:
                 slow += 1
                 by = f"slow: {by}"
             print(f"{number:2} {mutant.file}: {mutant.wrong.strip() or 'dropped'}: {by or 'SURVIVES'}", flush=True)

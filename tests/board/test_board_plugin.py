@@ -20,7 +20,7 @@ from armkin.board.backend.board import Board
 from armkin.board.kinds import board_of
 from armkin.errors import NoSolutionError, RobotFileError
 from command_line import ROOT, run, run_process
-from emulated_kinds import sample
+from emulated_kinds import run_sample
 
 WIDOW_X = {"waist": 1, "shoulder": 2, "elbow": 4, "forearm_roll": 6, "wrist_angle": 7, "wrist_rotate": 8}
 
@@ -62,7 +62,7 @@ def robots(folder: Path) -> list[Path]:
     return files
 
 
-def connected(arm: armkin.Arm, **noise: float) -> tuple[Board, Any]:
+def connect_emulated(arm: armkin.Arm, **noise: float) -> tuple[Board, Any]:
     """The arm's board and its emulated servos."""
     board = board_of(arm)
     port: Any = board.simulated()
@@ -80,7 +80,7 @@ def test_a_kind_that_is_not_installed_is_named_with_those_that_are(tmp_path: Pat
 def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
     for file in robots(tmp_path):
         arm = armkin.load(file)
-        board, port = connected(arm)
+        board, port = connect_emulated(arm)
         assert board.kind == "dynamixel"
         rng = np.random.default_rng(1)
         for _ in range(5):
@@ -100,7 +100,7 @@ def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("installed")
 def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     arm = armkin.load(robots(tmp_path)[1])
-    board, port = connected(arm, lost=0.01, damaged=0.01)
+    board, port = connect_emulated(arm, lost=0.01, damaged=0.01)
     board.machine.run([board.plan(board.machine.counts(), np.full((1, 6), 0.3))])
     board.machine.refresh()
     moves = {"start": "home", "moves": [{"joint": [10, 20, -20, 5, 5, 5]}, {"offset": {"xyz": [0, 0, 20]}}]}
@@ -146,7 +146,7 @@ def test_the_command_line_tells_of_it(tmp_path: Path) -> None:
 @pytest.mark.usefixtures("installed")
 @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
 def test_it_conforms(case: Callable[..., None]) -> None:
-    sample(case, "dynamixel")
+    run_sample(case, "dynamixel")
 
 
 def test_the_command_line_knows_the_kind(packages: Path, tmp_path: Path) -> None:

@@ -113,7 +113,7 @@ class Host:
 AXIS = AxisImage(True, False, -20_000, 20_000, 0, 20_000, 200_000)
 
 
-def ready(switch=None, image: Image | None = None) -> Host:  # type: ignore[no-untyped-def]
+def ready_host(switch=None, image: Image | None = None) -> Host:  # type: ignore[no-untyped-def]
     """A host with a configured board whose X, Y and Z are known and on."""
     board = BOARDS["uno_cnc_shield"]
     host = Host(SimBoard(board, switch))
@@ -132,7 +132,7 @@ CRUISE = [whole_steps(500, 1600, 0, (250, -500))] * 8  # 0.4 s at 5 and 10 kHz
 
 @pytest.mark.parametrize("brake", [1.0, 0.625])
 def test_a_hold_stops_on_the_path_within_the_ramp(brake: float) -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0, 1], [0, 0], CRUISE, at_rest=False, brake=brake) == Error.OK
     host.board.advance(0.1)
     before = host.status()
@@ -156,7 +156,7 @@ def test_a_hold_stops_on_the_path_within_the_ramp(brake: float) -> None:
 def test_a_limit_switch_stops_within_the_ramp_however_gentle_the_motion() -> None:
     unused = AxisImage()
     image = Image((AXIS, AXIS, AXIS, unused, unused), (), (GuardImage(False, (1, 0, 0, 0, 0)), *(GuardImage(),) * 2))
-    host = ready(lambda number, net: number != 0 or net[0] < 300, image)  # pressed is low
+    host = ready_host(lambda number, net: number != 0 or net[0] < 300, image)  # pressed is low
     assert host.move([0], [0], [whole_steps(5000, 1600, 0, (5000,))], at_rest=True, brake=0.25) == Error.OK
     host.board.advance(0.3)
     status = host.status()
@@ -166,7 +166,7 @@ def test_a_limit_switch_stops_within_the_ramp_however_gentle_the_motion() -> Non
 
 @pytest.mark.parametrize("brake", [1.0, 0.125])
 def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0, 1], [0, 0], CRUISE[:5], at_rest=False, brake=brake) == Error.OK
     for _ in range(10):
         host.board.advance(0.1)
@@ -177,7 +177,7 @@ def test_a_queue_that_runs_dry_stops_in_time(brake: float) -> None:
 
 
 def test_a_slow_arm_stands_where_its_queue_ends() -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0, 1], [0, 0], [whole_steps(640, 8000, 0, (640, -320))], at_rest=False) == Error.OK  # u = 10 ms
     host.board.advance(0.4)
     status = host.status()
@@ -186,7 +186,7 @@ def test_a_slow_arm_stands_where_its_queue_ends() -> None:
 
 
 def test_a_queue_that_ends_abruptly_is_lost() -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0, 1], [0, 0], CRUISE[:1], at_rest=False) == Error.OK
     host.board.motors.queue.dry = lambda u, **_: False  # type: ignore[method-assign]  # a board too busy to notice in time
     host.board.advance(0.2)
@@ -196,7 +196,7 @@ def test_a_queue_that_ends_abruptly_is_lost() -> None:
 
 
 def test_silence_is_a_hold() -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0], [0], [whole_steps(1000, 16000, 0, (100,))], at_rest=True) == Error.OK
     host.board.advance(0.4)
     assert host.status().state == State.MOVING
@@ -207,7 +207,7 @@ def test_silence_is_a_hold() -> None:
 
 
 def test_a_reset_at_rest_is_retained_and_a_reset_in_motion_is_lost() -> None:
-    host = ready()
+    host = ready_host()
     host.board.reset()
     info = host.hello()
     assert info.known == 7
@@ -222,7 +222,7 @@ def test_a_reset_at_rest_is_retained_and_a_reset_in_motion_is_lost() -> None:
 
 
 def test_a_power_cycle_forgets_all() -> None:
-    host = ready()
+    host = ready_host()
     host.board.hidden_cause = False
     host.board.reset(power=True)
     info = host.hello()
@@ -230,7 +230,7 @@ def test_a_power_cycle_forgets_all() -> None:
 
 
 def test_the_abort_input_stops_and_blocks() -> None:
-    host = ready()
+    host = ready_host()
     assert host.move([0, 1], [0, 0], CRUISE, at_rest=True) == Error.OK
     host.board.advance(0.05)
     host.board.inputs.abort_level = False
@@ -248,7 +248,7 @@ def test_homing_finds_the_edge() -> None:
     def switch(number: int, net: Sequence[int]) -> bool:
         return not (number == 1 and net[1] <= edge)
 
-    host = ready(switch)
+    host = ready_host(switch)
     going = protocol.home(
         0, switch=1, closed=False, slow=32, backoff=200, travel=5000, time=100, rate=[0, -4000, 0, 0, 0]
     )
@@ -265,7 +265,7 @@ def test_homing_finds_the_edge() -> None:
 
 
 def test_homing_without_a_switch_ends_with_travel() -> None:
-    host = ready()
+    host = ready_host()
     going = protocol.home(
         0, switch=0, closed=False, slow=32, backoff=200, travel=3000, time=100, rate=[4000, 0, 0, 0, 0]
     )
@@ -279,7 +279,7 @@ def test_homing_without_a_switch_ends_with_travel() -> None:
 
 
 def test_jogging_needs_its_handle_and_brakes_before_the_limit() -> None:
-    host = ready()
+    host = ready_host()
     for _ in range(10):
         assert host.say(protocol.jog(0, [10_000, 0, 0, 0, 0])) == Error.OK
         host.board.advance(0.1)
@@ -294,7 +294,7 @@ def test_jogging_needs_its_handle_and_brakes_before_the_limit() -> None:
 
 
 def test_a_lost_axis_jogs_slowly() -> None:
-    host = ready()
+    host = ready_host()
     assert host.say(protocol.enable(0, 0)) == Error.OK
     assert host.say(protocol.enable(0, 1)) == Error.OK
     assert host.status().known == 0
@@ -305,7 +305,7 @@ def test_a_lost_axis_jogs_slowly() -> None:
 
 
 def test_a_planned_line_runs_to_its_count() -> None:
-    host = ready()
+    host = ready_host()
     segments = straight_line([0, 0, 0], [-1067, -10144, 5667], 1.2, 2.0).segments
     counts, sent = [0, 0, 0], 0
     while sent < len(segments):
@@ -324,7 +324,7 @@ def test_a_planned_line_runs_to_its_count() -> None:
 def test_mutated_frames_move_nothing_that_was_not_sent() -> None:
     """Frames whose checksum is right and whose content is not: start, end and steps must agree."""
     rng = random.Random(8)
-    host = ready()
+    host = ready_host()
     moved = 0
     for _ in range(3000):
         base = list(host.status().counts)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_feetech_machine import ARM, bus, connect_servos
+from test_feetech_machine import ARM, connect_servos, servo_bus
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
@@ -37,7 +37,7 @@ class Suspended(Wire):
         return super().now() + self.paused
 
 
-def prepared() -> tuple[Suspended, FirmwareMachine]:
+def prepare_board() -> tuple[Suspended, FirmwareMachine]:
     """A board that knows its arm at home, and the program that speaks with it."""
     arm = arms.load_arm(ROOT / "robots/three_dof.yaml")
     configuration = configure(arm)
@@ -48,7 +48,7 @@ def prepared() -> tuple[Suspended, FirmwareMachine]:
 
 
 def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None:
-    port, machine = prepared()
+    port, machine = prepare_board()
     port.every = 0.3
     machine.run([machine.plan(machine.counts(), np.deg2rad(POSE)[None])])
     assert port.paused > 5 * PAUSE
@@ -56,7 +56,7 @@ def test_a_program_that_was_suspended_does_not_take_the_board_for_gone() -> None
 
 
 def test_a_board_that_is_gone_is_told_within_two_seconds() -> None:
-    port, machine = prepared()
+    port, machine = prepare_board()
     port.silent, began = True, port.now()
     with pytest.raises(LinkError, match="does not answer any more"):
         machine.run([machine.plan(machine.counts(), np.deg2rad(POSE)[None])])
@@ -77,7 +77,7 @@ class SuspendedBus(ServoBus):
 
 
 def test_servos_go_on_where_they_were() -> None:
-    port = SuspendedBus(bus().servos.values())
+    port = SuspendedBus(servo_bus().servos.values())
     machine = connect_servos(port)
     start, began = np.array(machine.counts()), port.now()
     plan = machine.plan(machine.counts(), np.array([2.0, -1.5, 1.0]))

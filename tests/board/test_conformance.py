@@ -7,10 +7,10 @@ from collections.abc import Callable
 import pytest
 
 from armkin.board import conformance
-from emulated_kinds import EMULATED, sample
+from emulated_kinds import EMULATED, run_sample
 
 
 @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
 @pytest.mark.parametrize("kind", EMULATED)
 def test_every_kind_conforms(kind: str, case: Callable[..., None]) -> None:
-    sample(case, kind)
+    run_sample(case, kind)

@@ -22,7 +22,7 @@ from pty_port import PtyPort
 SIX = range(1, 7)
 
 
-def patiently(ask: Callable[[], Any], right: Callable[[Any], bool]) -> Any:
+def ask_patiently(ask: Callable[[], Any], right: Callable[[Any], bool]) -> Any:
     """The library's answer; its packets time out after some milliseconds, which a busy computer lets pass."""
     end = time.monotonic() + 60
     while time.monotonic() < end:
@@ -39,20 +39,20 @@ def test_the_makers_library_drives_the_simulated_servos() -> None:
         assert port.openPort()
         port.setBaudRate(1_000_000)
         for number in SIX:  # a late answer to the question before is no right one
-            patiently(partial(maker.ping, port, number), lambda answer: answer == (777, 0, 0))
-            patiently(partial(maker.read2ByteTxRx, port, number, 56), (1000 + number, 0, 0).__eq__)
+            ask_patiently(partial(maker.ping, port, number), lambda answer: answer == (777, 0, 0))
+            ask_patiently(partial(maker.read2ByteTxRx, port, number, 56), (1000 + number, 0, 0).__eq__)
         assert maker.ping(port, 9)[1] != 0
 
-        patiently(lambda: maker.write1ByteTxRx(port, 3, 40, 1), lambda answer: answer == (0, 0))
-        patiently(lambda: maker.write2ByteTxRx(port, 3, 46, 2000), lambda answer: answer == (0, 0))
+        ask_patiently(lambda: maker.write1ByteTxRx(port, 3, 40, 1), lambda answer: answer == (0, 0))
+        ask_patiently(lambda: maker.write2ByteTxRx(port, 3, 46, 2000), lambda answer: answer == (0, 0))
         goals = sdk.GroupSyncWrite(port, maker, 42, 2)
         goals.addParam(3, [2000 & 0xFF, 2000 >> 8])
         goals.txPacket()
-        patiently(lambda: maker.read2ByteTxRx(port, 3, 56), lambda answer: answer == (2000, 0, 0))
+        ask_patiently(lambda: maker.read2ByteTxRx(port, 3, 56), lambda answer: answer == (2000, 0, 0))
         places = sdk.GroupSyncRead(port, maker, 56, 2)
         for number in SIX:
             places.addParam(number)
-        patiently(places.txRxPacket, lambda answer: answer == 0)
+        ask_patiently(places.txRxPacket, lambda answer: answer == 0)
         assert [places.getData(number, 56, 2) for number in SIX] == [1001, 1002, 2000, 1004, 1005, 1006]
         port.closePort()
 

@@ -29,7 +29,7 @@ ARM = arm_of_file(parse_robot_file(TEXT))
 HOME = armkin.pulses(ARM, ARM.home).tolist()
 
 
-def bus(noise: Noise | None = None) -> ServoBus:
+def servo_bus(noise: Noise | None = None) -> ServoBus:
     return ServoBus((Servo(k + 1, position) for k, position in enumerate(HOME)), noise=noise)
 
 
@@ -46,7 +46,7 @@ def test_zero_and_invert_are_the_robot_files() -> None:
 
 @pytest.mark.parametrize("noise", [None, Noise(0.01, 0.01, 5)])
 def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> None:
-    port = bus(noise)
+    port = servo_bus(noise)
     machine = connect_servos(port)
     rng = np.random.default_rng(1)
     for _ in range(8 if noise else 20):
@@ -63,7 +63,7 @@ def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> No
 
 
 def test_nothing_moves_when_the_motors_go_on() -> None:
-    port = bus()
+    port = servo_bus()
     for servo in port.servos.values():
         servo.set(registers.GOAL_POSITION, 100)  # an old goal
     connect_servos(port)
@@ -72,7 +72,7 @@ def test_nothing_moves_when_the_motors_go_on() -> None:
 
 
 def test_a_stop_slows_down_on_the_line() -> None:
-    port = bus()
+    port = servo_bus()
     polls = iter(range(10_000))
     machine = connect_servos(port, lambda: next(polls) > 40)
     goal = np.deg2rad([120, 60, -90])
@@ -87,7 +87,7 @@ def test_a_stop_slows_down_on_the_line() -> None:
 
 
 def test_a_blocked_servo_holds_the_arm() -> None:
-    port = bus()
+    port = servo_bus()
     machine = connect_servos(port)
     port.servos[2].write = lambda address, values: None  # type: ignore[method-assign]
     with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
@@ -97,7 +97,7 @@ def test_a_blocked_servo_holds_the_arm() -> None:
 
 
 def test_a_servos_errors_are_told() -> None:
-    port = bus()
+    port = servo_bus()
     machine = connect_servos(port)
     port.servos[3].errors = 36
     with pytest.raises(LinkError, match=r"servo 3 \(j3\) reports overheating, overload"):
@@ -113,7 +113,7 @@ def test_servos_that_are_missing_are_named() -> None:
 
 
 def test_a_cable_that_is_pulled_in_motion_is_told() -> None:
-    port = bus()
+    port = servo_bus()
     polls = iter(range(10_000))
 
     def pull() -> bool:
@@ -127,7 +127,7 @@ def test_a_cable_that_is_pulled_in_motion_is_told() -> None:
 
 
 def test_relaxed_motors_can_be_moved_by_hand_and_read() -> None:
-    port = bus()
+    port = servo_bus()
     machine = connect_servos(port)
     machine.relax()
     for k, servo in port.servos.items():
@@ -148,9 +148,9 @@ class Stuck(Servo):
         self.position = min(self.position, self.stop)
 
 
-def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
+def connect_stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
     """An arm one of whose servos stops so many counts from home."""
-    port = bus()
+    port = servo_bus()
     port.servos[number] = Stuck(number, HOME[number - 1])
     machine = connect_servos(port)
     port.servos[number].stop = HOME[number - 1] + after  # type: ignore[attr-defined]
@@ -159,7 +159,7 @@ def stuck(number: int, after: float) -> tuple[ServoBus, ServoMachine]:
 
 @pytest.mark.parametrize("number", [1, 3])
 def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
-    port, machine = stuck(number, 100)
+    port, machine = connect_stuck(number, 100)
     with pytest.raises(LinkError, match=rf"servo {number} \(j{number}\) stands 1[0-9][0-9] counts from its goal"):
         machine.run([machine.plan(machine.counts(), np.deg2rad([20, -20, 20]))])
     blocked = port.servos[number]
@@ -167,7 +167,7 @@ def test_a_move_has_arrived_when_every_servo_has(number: int) -> None:
 
 
 def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
-    port, machine = stuck(1, 100)
+    port, machine = connect_stuck(1, 100)
     with pytest.raises(LinkError, match=r"servo 1 \(j1\) is \d+ counts behind"):
         machine.run([machine.plan(machine.counts(), np.deg2rad([120, -120, 120]))])
     positions = [servo.position for servo in port.servos.values()]
@@ -178,7 +178,7 @@ def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
 
 def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() -> None:
     """Whoever set up the servo gave it limits: it would stop there, and never arrive."""
-    port = bus()
+    port = servo_bus()
     port.servos[2].set(registers.LEAST, 1500)
     port.servos[2].set(registers.MOST, 2300)
     machine = connect_servos(port)

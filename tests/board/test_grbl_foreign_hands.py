@@ -48,7 +48,7 @@ def stands_elsewhere(port: Grbl) -> GrblMachine:
     return machine
 
 
-def other(port: Grbl, *lines: str) -> None:
+def speak_as_other_program(port: Grbl, *lines: str) -> None:
     """Another program speaks, and waits until all is done."""
     for line in lines:
         port.write(line.encode() + b"\n")
@@ -78,7 +78,7 @@ def test_what_another_program_sets_between_two_commands_is_lost_in_words(
 ) -> None:
     stands_elsewhere(port)
     before = list(port.steps)
-    other(port, *lines)
+    speak_as_other_program(port, *lines)
     after = list(port.steps)
     again = connect_grbl(port)
     assert again.position() == "lost"
@@ -89,7 +89,7 @@ def test_what_another_program_sets_between_two_commands_is_lost_in_words(
 
 
 def test_offsets_that_somebody_set_long_ago_are_recorded_as_found(port: Grbl) -> None:
-    other(port, "G10 L2 P1 X10 Y-20 Z30", "G10 L2 P3 X1 Y1 Z1", "G43.1 Z5", "G91", "G20", "G55")
+    speak_as_other_program(port, "G10 L2 P1 X10 Y-20 Z30", "G10 L2 P3 X1 Y1 Z1", "G43.1 Z5", "G91", "G20", "G55")
     machine = stands_elsewhere(port)
     for _ in range(2):
         assert (machine.position(), list(machine.counts())) == ("known", port.steps[:3])
@@ -100,7 +100,7 @@ def test_offsets_that_somebody_set_long_ago_are_recorded_as_found(port: Grbl) ->
 @pytest.mark.parametrize("line", ["G20", "G91", "G93", "G18", "G21G1F5", "G0", "G80"])
 def test_modes_that_another_program_left_change_no_motion(port: Grbl, line: str) -> None:
     machine = stands_elsewhere(port)
-    other(port, line)
+    speak_as_other_program(port, line)
     again = connect_grbl(port)
     assert again.position() == "known"
     again.prepare()
@@ -136,7 +136,7 @@ OPEN = ["G1X5F500", "G1X5", "g0 x-4", "$J=G91X5F500", "$H", "$100=77", "$N0=G20"
 def test_a_line_that_another_program_left_open_is_never_ended(port: Grbl) -> None:
     machine = stands_elsewhere(port)
     before, settings = list(port.steps), dict(port.settings)
-    other(port, "F600")
+    speak_as_other_program(port, "F600")
     for line, end in itertools.product(OPEN, ["", " ", "(", "(half a comment"]):
         port.write((line + end).encode())
         port.advance(0.1)
@@ -168,7 +168,7 @@ def test_another_program_s_motion_is_told_and_left_alone(port: Grbl) -> None:
     port.advance(0.5)
     with pytest.raises(LinkError, match="another program drives it"):
         connect_grbl(port)
-    other(port, "")
+    speak_as_other_program(port, "")
     assert port.steps[0] == armkin.pulses(ARM, GOAL)[0] + round(20 * FITS[100])
 
 
@@ -219,7 +219,7 @@ def test_an_offset_that_is_set_in_a_motion_is_found_at_its_end_and_at_its_stop(p
         again = connect_grbl(port)
         assert again.position() == "lost" or (origin + again.counts()).tolist() == port.steps[:3]
         port.boot()
-        other(port, "G10L2P1X0Y0Z0", "G54", "G49", "G92.1")
+        speak_as_other_program(port, "G10L2P1X0Y0Z0", "G54", "G49", "G92.1")
 
 
 def test_a_reset_in_the_motion_of_a_killed_sender_is_lost(port: Grbl) -> None:
@@ -240,7 +240,7 @@ def test_a_reset_in_the_motion_of_a_killed_sender_is_lost(port: Grbl) -> None:
     with pytest.raises(Killed):
         machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]), speed=0.3)])
     port.write(b"\x18")
-    other(port, "$X")
+    speak_as_other_program(port, "$X")
     assert connect_grbl(port).position() == "lost"
 
 

@@ -28,7 +28,7 @@ ARM = armkin.load("three_dof")
 FITS = {number: value for number, (_, value) in expected_settings(axes_of(ARM)).items()}
 
 
-def board(**more: Any) -> Grbl:
+def grbl_board(**more: Any) -> Grbl:
     name = f"machine-{os.getpid()}"  # its record is no other worker's
     grbl = Grbl(4, name, {**FITS, **more.pop("settings", {})}, **more)
     grbl.simulated = False  # so that nobody vouches for the position by itself
@@ -39,32 +39,32 @@ def connect_grbl(port: Grbl, stop: Callable[[], bool] = lambda: False) -> GrblMa
     return GrblMachine(port, ARM, stop)
 
 
-def pins(port: Grbl) -> list[int]:
+def pin_counts(port: Grbl) -> list[int]:
     """Steps at the pins, counted from where the arm was taken to stand at home."""
     return [port.steps[k] for k in range(3)]
 
 
 def test_200_random_moves_are_read_back_exact() -> None:
-    port = board()
+    port = grbl_board()
     machine = connect_grbl(port)
     assert machine.prepare(assume=machine.arm.home)
     rng = np.random.default_rng(3)
     for _ in range(200):
         goal = rng.uniform(ARM.lower, ARM.upper)
         machine.run([machine.plan(machine.counts(), goal)])
-        assert list(machine.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+        assert list(machine.counts()) == pin_counts(port) == armkin.pulses(ARM, goal).tolist()
 
 
 def test_the_published_pose_puts_the_published_steps_on_the_pins() -> None:
-    port = board()
+    port = grbl_board()
     machine = connect_grbl(port)
     machine.prepare(assume=machine.arm.home)
     machine.run([machine.plan(machine.counts(), np.deg2rad([-30, 5, -5]))])
-    assert pins(port) == [-1067, -10144, 5667]
+    assert pin_counts(port) == [-1067, -10144, 5667]
 
 
 def test_the_position_outlives_the_command_but_no_reset() -> None:
-    port = board()
+    port = grbl_board()
     machine = connect_grbl(port)
     machine.prepare(assume=machine.arm.home)
     machine.run([machine.plan(machine.counts(), np.deg2rad([10, 80, -70]))])
@@ -95,7 +95,7 @@ def test_settings_that_do_not_fit_are_refused_and_setup_writes_them() -> None:
 
 
 def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
-    port = board()
+    port = grbl_board()
     goal = np.deg2rad([60, 20, -60])
     for after in (5, 30, 60, 90):
         polls = iter(range(10_000))
@@ -105,17 +105,17 @@ def test_a_stop_holds_on_the_path_and_the_next_command_goes_on() -> None:
         plan = machine.plan(machine.counts(), goal)
         with pytest.raises(StoppedError):
             machine.run([plan])
-        assert list(machine.counts()) == pins(port)
-        share = [count / end for count, end in zip(pins(port), plan.end.tolist(), strict=True) if end]
+        assert list(machine.counts()) == pin_counts(port)
+        share = [count / end for count, end in zip(pin_counts(port), plan.end.tolist(), strict=True) if end]
         assert max(share) - min(share) < 2e-3
         again = connect_grbl(port)
         assert again.position() == "known"
         again.prepare()
         again.run([again.plan(again.counts(), goal)])
-        assert pins(port) == plan.end.tolist()
+        assert pin_counts(port) == plan.end.tolist()
 
 
-def during(port: Grbl, act: Callable[[], None]) -> Callable[[], bool]:
+def act_during(port: Grbl, act: Callable[[], None]) -> Callable[[], bool]:
     polls = iter(range(10_000))
 
     def stop() -> bool:
@@ -135,8 +135,8 @@ def during(port: Grbl, act: Callable[[], None]) -> Callable[[], bool]:
     ],
 )
 def test_what_loses_the_position_is_told(fault: Callable[[Grbl], None], message: str) -> None:
-    port = board()
-    machine = connect_grbl(port, during(port, lambda: fault(port)))
+    port = grbl_board()
+    machine = connect_grbl(port, act_during(port, lambda: fault(port)))
     machine.prepare(assume=machine.arm.home)
     with pytest.raises(LinkError, match=message):
         machine.run([machine.plan(machine.counts(), np.deg2rad([60, 20, -60]))])
@@ -164,14 +164,14 @@ def test_a_noisy_line_never_gives_a_false_position(seed: int) -> None:
         try:
             machine = connect_grbl(port)
             machine.prepare(assume=machine.arm.home if machine.position() == "lost" else None)
-            origin = np.array(pins(port)) - machine.counts()
+            origin = np.array(pin_counts(port)) - machine.counts()
             plan = machine.plan(
                 machine.counts(), np.radians([rng.uniform(-90, 90), rng.uniform(0, 90), rng.uniform(-90, 0)])
             )
             machine.run([plan])
         except (LinkError, armkin.UsageError, armkin.NoSolutionError):
             continue
-        assert (np.array(pins(port)) - origin).tolist() == plan.end.tolist() == list(machine.counts())
+        assert (np.array(pin_counts(port)) - origin).tolist() == plan.end.tolist() == list(machine.counts())
         right += 1
     assert right > 0
 
@@ -214,7 +214,7 @@ def test_damaged_answers_never_give_a_false_position(seed: int) -> None:
         except LinkError:
             continue
         assert machine.position() == "known"
-        assert list(machine.counts()) == pins(port)
+        assert list(machine.counts()) == pin_counts(port)
         error_count += 1
     assert error_count > 10
 
@@ -241,12 +241,12 @@ def test_a_lost_answer_ends_the_wait_and_tells_where_the_arm_stands() -> None:
     with pytest.raises(LinkError, match="without an answer; the arm was stopped\nthe arm stands at q1 = 30"):
         machine.run([plan])
     assert port.now() - began < plan.duration + 5
-    assert connect_grbl(port).counts() == machine.counts() == tuple(pins(port)) == tuple(plan.end.tolist())
+    assert connect_grbl(port).counts() == machine.counts() == tuple(pin_counts(port)) == tuple(plan.end.tolist())
 
 
 def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
     """A stop clears GRBL's queue by a reset, which switches M3 off."""
-    port = board()
+    port = grbl_board()
     polls = iter(range(10_000))
     machine = connect_grbl(port, lambda: next(polls) > 30)
     machine.prepare(assume=machine.arm.home)
@@ -266,7 +266,7 @@ def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
 
 
 def test_a_pause_of_a_path_is_a_dwell() -> None:
-    port = board()
+    port = grbl_board()
     machine = connect_grbl(port)
     machine.prepare(assume=machine.arm.home)
     plan = armkin.path(
@@ -277,4 +277,4 @@ def test_a_pause_of_a_path_is_a_dwell() -> None:
         assert isinstance(part, Job)
         machine.run([part])
     assert port.now() - before > 1.5
-    assert pins(port) == [0, 0, 0]
+    assert pin_counts(port) == [0, 0, 0]

@@ -22,7 +22,7 @@ def open_session(board: Grbl) -> Session:
     return session
 
 
-def never() -> bool:
+def never_stop() -> bool:
     return False
 
 
@@ -32,7 +32,7 @@ def test_lines_arrive_at_their_steps_and_the_buffer_never_overflows() -> None:
     rng = random.Random(1)
     targets = [[rng.randrange(-9000, 9000) / 250 for _ in range(4)] for _ in range(60)]
     work = [f"G53G1{''.join(f'{letter}{v:.5f}' for letter, v in zip('XYZA', t, strict=True))}F6000" for t in targets]
-    assert session.stream([*work, "G4P0"], never)
+    assert session.stream([*work, "G4P0"], never_stop)
     assert board.steps == [round(250 * value) for value in targets[-1]]
     assert session.status().position == tuple(round(value, 3) for value in targets[-1])
 
@@ -175,7 +175,7 @@ def test_any_bytes_end_in_an_answer_or_an_error() -> None:
         session = Session(Noise())
         try:
             session.open()
-            session.stream(["G1X1F1"] * 5, never)
+            session.stream(["G1X1F1"] * 5, never_stop)
             session.status()
         except LinkError:
             pass

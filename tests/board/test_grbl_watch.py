@@ -43,21 +43,21 @@ def open_grbl(spoil: Spoil | None = None) -> tuple[Spoilt, GrblMachine]:
     return port, machine
 
 
-def feed(value: float) -> Spoil:
+def spoil_feed(value: float) -> Spoil:
     return lambda line: re.sub(r"F[\d.]+", f"F{value}", line)
 
 
-def target(before: str, after: str) -> Spoil:
+def spoil_target(before: str, after: str) -> Spoil:
     return lambda line: line.replace(before, after)
 
 
 @pytest.mark.parametrize(
     ("spoil", "message", "seconds"),
     [
-        (feed(9000), "it is faster than planned", 1.5),
-        (feed(0.02), "it hardly moves on", 4.5),
-        (target("X-5", "X-1"), "it has left its path", 1.5),
-        (target("Y", "A"), "it has left its path", 1.5),
+        (spoil_feed(9000), "it is faster than planned", 1.5),
+        (spoil_feed(0.02), "it hardly moves on", 4.5),
+        (spoil_target("X-5", "X-1"), "it has left its path", 1.5),
+        (spoil_target("Y", "A"), "it has left its path", 1.5),
     ],
 )
 def test_a_damaged_line_is_held_in_motion(spoil: Spoil, message: str, seconds: float) -> None:

@@ -30,14 +30,14 @@ class Killed(BaseException):
     """kill -9."""
 
 
-def grbl(name: str, *, hal: bool) -> Grbl:
+def grbl_port(name: str, *, hal: bool) -> Grbl:
     settings = {number: value for number, (_, value) in expected_settings(axes_of(GRBL)).items()}
     port = Grbl(4, name, settings | ({384: 1} if hal else {}), hal=hal)
     port.step = 0.01
     return port
 
 
-def steps(port: Any) -> list[int]:
+def motor_steps(port: Any) -> list[int]:
     """Of the motors, counted from home."""
     if isinstance(port, Grbl):
         return port.steps[:3]
@@ -57,7 +57,7 @@ def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(kind: str, after:
     port: Any = (
         Klipper(klipper_axes.settings_of(klipper_axes.axes_of(arm)), name)
         if kind == "klipper"
-        else grbl(name, hal=kind == "grblHAL")
+        else grbl_port(name, hal=kind == "grblHAL")
     )
     port.simulated = False  # so that nobody vouches for the position by itself
     board = board_of(arm)
@@ -77,8 +77,8 @@ def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(kind: str, after:
     port.close()
     again = board.attach(port, lambda: False)
     assert not again.prepare()
-    assert (again.position(), list(again.counts())) == ("known", steps(port))
+    assert (again.position(), list(again.counts())) == ("known", motor_steps(port))
     again.run([again.plan(again.counts(), GOAL)])
-    assert steps(port) == armkin.pulses(arm, GOAL).tolist()
+    assert motor_steps(port) == armkin.pulses(arm, GOAL).tolist()
     os.unlink(record_path(name))
     assert board.attach(port, lambda: False).position() == "lost"

@@ -41,7 +41,7 @@ def open_klipper(stop: Callable[[], bool] = lambda: False) -> tuple[Klipper, Kli
     return port, machine
 
 
-def pins(port: Klipper) -> list[int]:
+def pin_counts(port: Klipper) -> list[int]:
     """Steps that the motors stand at, counted from home."""
     return [round((port.at[axis.section] - axis.at_home) * axis.steps) for axis in AXES]
 
@@ -53,7 +53,7 @@ def test_200_random_moves_are_read_back_exact_and_keep_their_time() -> None:
         goal = rng.uniform(ARM.lower, ARM.upper)
         plan, began = machine.plan(machine.counts(), goal), port.now()
         machine.run([plan])
-        assert list(machine.counts()) == pins(port) == armkin.pulses(ARM, goal).tolist()
+        assert list(machine.counts()) == pin_counts(port) == armkin.pulses(ARM, goal).tolist()
         assert plan.duration <= port.now() - began < plan.duration + 0.3
     assert port.jumps == 0  # no corner for which Klipper would slow down
 
@@ -70,7 +70,7 @@ def test_a_curve_goes_on_without_a_stop() -> None:
         x = [float(line.split()[1][1:]) for line in Lines(part, AXES)]
         assert (np.diff([0, *x]) > 0).all()
         assert x[-1] == pytest.approx(10 * part.duration, abs=1e-4)
-    assert pins(port) == [0, 0, 0]
+    assert pin_counts(port) == [0, 0, 0]
     assert port.now() - began == pytest.approx(plan.duration, abs=0.6)
     assert port.jumps == 0
 
@@ -124,15 +124,15 @@ def test_a_stop_brakes_on_the_way_and_the_next_command_goes_on(after: int) -> No
     with pytest.raises(StoppedError):
         machine.run([plan])
     assert machine.position() == "known"
-    assert list(machine.counts()) == pins(port)
-    share = [count / end for count, end in zip(pins(port), plan.end.tolist(), strict=True)]
+    assert list(machine.counts()) == pin_counts(port)
+    share = [count / end for count, end in zip(pin_counts(port), plan.end.tolist(), strict=True)]
     assert max(share) - min(share) < 2e-3
     assert port.jumps == 0
     again = KlipperMachine(port, ARM)
     assert (again.position(), again.counts()) == ("known", machine.counts())
     assert not again.prepare()
     again.run([again.plan(again.counts(), np.deg2rad([60, 20, -60]))])
-    assert pins(port) == plan.end.tolist()
+    assert pin_counts(port) == plan.end.tolist()
 
 
 @pytest.mark.parametrize(

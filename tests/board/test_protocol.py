@@ -35,7 +35,7 @@ def golden_frames() -> list[tuple[str, dict[str, str], bytes, bytes]]:
     return frames
 
 
-def integers(text: str) -> tuple[int, ...]:
+def parse_integers(text: str) -> tuple[int, ...]:
     return tuple(int(x) for x in text.split(","))
 
 
@@ -43,7 +43,7 @@ def axes_of(mask: str) -> list[int]:
     return [i for i in range(16) if int(mask) >> i & 1]
 
 
-def built(name: str, field: dict[str, str]) -> bytes:
+def build_payload(name: str, field: dict[str, str]) -> bytes:
     """The payload of a golden line, built by the code under test."""
     tag = int(field.get("tag", 0))
     if name == "HELLO":
@@ -59,18 +59,20 @@ def built(name: str, field: dict[str, str]) -> bytes:
     if name == "ENABLE":
         return protocol.enable(tag, int(field["what"]))
     if name == "SET_POSITION":
-        return protocol.set_position(tag, dict(zip(axes_of(field["mask"]), integers(field["counts"]), strict=True)))
+        return protocol.set_position(
+            tag, dict(zip(axes_of(field["mask"]), parse_integers(field["counts"]), strict=True))
+        )
     if name == "MOTION":
         segments = []
         for text in field["segments"].split(";"):
             ticks, interval, add, steps = text.split("/")
-            segments.append(protocol.Segment(int(ticks), int(interval), 256 * int(add), integers(steps)))
+            segments.append(protocol.Segment(int(ticks), int(interval), 256 * int(add), parse_integers(steps)))
         flags = int(field["flags"])
         return motion_frame.motion(
             tag,
             axes_of(field["mask"]),
-            integers(field["start"]),
-            integers(field["end"]),
+            parse_integers(field["start"]),
+            parse_integers(field["end"]),
             segments,
             at_rest=bool(flags & 1),
             wide=bool(flags & 2),
@@ -85,27 +87,27 @@ def built(name: str, field: dict[str, str]) -> bytes:
             backoff=int(field["backoff"]),
             travel=int(field["travel"]),
             time=int(field["time"]),
-            rate=integers(field["rate"]),
+            rate=parse_integers(field["rate"]),
         )
     if name == "JOG":
-        return protocol.jog(tag, integers(field["rate"]))
+        return protocol.jog(tag, parse_integers(field["rate"]))
     if name in ("ACK", "CREDIT"):
         fields = (int(field[k]) for k in ("next", "error", "detail", "state", "free", "queued", "session"))
         return protocol.pack_ack((protocol.Ack if name == "ACK" else protocol.Credit)(*fields))
     if name == "INFO":
         values = {k: int(v) for k, v in field.items() if k != "firmware"}
-        major, minor = integers(field["firmware"])
+        major, minor = parse_integers(field["firmware"])
         return protocol.pack_info(protocol.Info(**values, firmware=(major, minor)))
     assert name == "STATUS"
     values = {k: int(v) for k, v in field.items() if k != "counts"}
-    return protocol.pack_status(protocol.Status(**values, counts=integers(field["counts"])))
+    return protocol.pack_status(protocol.Status(**values, counts=parse_integers(field["counts"])))
 
 
 @pytest.mark.parametrize(
     ("name", "fields", "payload", "wire"), golden_frames(), ids=lambda v: v if isinstance(v, str) else ""
 )
 def test_golden_frames(name: str, fields: dict[str, str], payload: bytes, wire: bytes) -> None:
-    assert built(name, fields) == payload
+    assert build_payload(name, fields) == payload
     assert protocol.encode_frame(payload) == wire
     assert list(protocol.Splitter().feed(wire)) == [payload]
     reply = protocol.parse_reply(payload)

@@ -96,7 +96,7 @@ def motions(tmp_path: Path) -> dict[str, tuple[object, ...]]:
     }
 
 
-def distance(track: list[tuple[int, ...]], way: np.ndarray) -> float:
+def farthest_from(track: list[tuple[int, ...]], way: np.ndarray) -> float:
     """The farthest that a point of the track is from a polyline, over all motors [steps]."""
     a, d = way[:-1], np.diff(way, axis=0)
     worst = 0.0
@@ -131,7 +131,7 @@ def test_a_motion_that_was_held_goes_on_and_ends_where_it_should(
     assert code == 0, err
     assert arm.counts == end
     assert len(arm.track) > 500
-    assert distance(arm.track, full_track) <= 4  # the whole motion was sampled every few ms
+    assert farthest_from(arm.track, full_track) <= 4  # the whole motion was sampled every few ms
 
 
 def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Path) -> None:
@@ -179,7 +179,7 @@ def test_a_sender_that_was_killed_leaves_a_note_that_is_enough(
 ) -> None:
     """kill -9: nobody has noted where the arm came to rest; it must lie on the plan."""
     assert arm.send(0, 90, -90, "--assume-home")[0] == 0
-    _dies(monkeypatch, lambda: arm.board.motors.counts()[1] < -3000)
+    _kill_sender(monkeypatch, lambda: arm.board.motors.counts()[1] < -3000)
     assert arm.send(*motions["single"])[0] == 130
     note = Path(note_path(arm.name)).read_text()
     assert '"stands": null' in note
@@ -193,7 +193,7 @@ def test_a_sender_that_was_killed_leaves_a_note_that_is_enough(
     assert again.counts == [-1067, -10144, 5667]
 
 
-def _dies(monkeypatch: pytest.MonkeyPatch, is_time: Callable[[], bool]) -> None:
+def _kill_sender(monkeypatch: pytest.MonkeyPatch, is_time: Callable[[], bool]) -> None:
     """The sender ends without a word once `is_time` says so."""
     read = Wire.read
 
@@ -221,7 +221,7 @@ def test_a_stop_says_where_the_arm_stands_and_that_it_can_go_on(
     assert arm.counts == [-1067, -10144, 5667]
 
 
-def _moves(way: Cut) -> list[int]:
+def _counts_reached(way: Cut) -> list[int]:
     """Where a fresh board has come to that carries a plan out from its start."""
     arm = way.trajectory.arm
     machine = FirmwareMachine(SimPort(SimBoard(BOARDS["uno_cnc_shield"])), arm, configure(arm))
@@ -243,7 +243,7 @@ def test_what_is_left_at_every_one_of_the_last_steps_is_taken(goal: tuple[int, .
     for counts in map(np.array, last):
         place = next(places_on([full_plan], counts))
         left = cut_trajectory(remaining_trajectory(full_plan, place, joints(arm, counts)), counts, min_interval=448)
-        assert _moves(left) == full_plan.end.tolist(), counts
+        assert _counts_reached(left) == full_plan.end.tolist(), counts
 
 
 def test_a_way_of_less_than_a_step_is_taken() -> None:
@@ -255,7 +255,7 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
         way = cut_trajectory(
             Trajectory(arm, standing, (straight_move(arm, standing, goal),)), [128, -1193, 1333], min_interval=448
         )
-        assert _moves(way) == way.end.tolist() != way.start.tolist()
+        assert _counts_reached(way) == way.end.tolist() != way.start.tolist()
 
 
 @pytest.mark.parametrize("begin", [0.3, 0.5, 0.8, 0.95])
@@ -276,4 +276,4 @@ def test_what_is_left_of_a_curve_keeps_to_the_joints_limits(begin: float) -> Non
     assert left.duration < stretch.duration - t0 + 1.5
     way = exact_pulses(arm, stretch.evaluate(np.linspace(t0, stretch.duration, 20_000)))
     track = [tuple(row) for row in exact_pulses(arm, left.evaluate(t[::40]))]
-    assert distance(track, way) < 0.01
+    assert farthest_from(track, way) < 0.01

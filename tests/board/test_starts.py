@@ -16,7 +16,7 @@ from armkin.motion.joint_moves import plan_joint_moves as plan_joints
 from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import run
-from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, on
+from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, simulated_kind
 
 THREE_DOF = armkin.load("three_dof")
 
@@ -24,7 +24,7 @@ THREE_DOF = armkin.load("three_dof")
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_path_sent_from_elsewhere_is_on_its_way_from_the_first_step(kind: str) -> None:
     """A sample: all of them on all kinds is `tests/bench/bench_starts.py`."""
-    kind_of_board, k = on(kind), list(KINDS).index(kind)
+    kind_of_board, k = simulated_kind(kind), list(KINDS).index(kind)
     examples = [yaml.safe_load(path.read_text()) for path in EXAMPLES if kind in ("uno_cnc_shield", "klipper")]
     for moves in (*examples, PATHS[2 * k + 4]):
         motion = carried_out(kind_of_board, moves, ELSEWHERE[k % len(ELSEWHERE)])
@@ -36,7 +36,7 @@ def test_a_path_sent_from_elsewhere_is_on_its_way_from_the_first_step(kind: str)
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "grbl"])
 def test_both_reports_of_a_false_start(kind: str) -> None:
     """A point as the start: the tip began 67 mm off the circle; home behind a move: 36 mm off the lines."""
-    kind_of_board = on(kind)
+    kind_of_board = simulated_kind(kind)
     for moves, place in zip(PATHS[:2], ((0, 90, -90), (8, 84, -80)), strict=True):
         motion = carried_out(kind_of_board, moves, place)
         assert motion.off_mm < kind_of_board.tolerance
@@ -45,7 +45,7 @@ def test_both_reports_of_a_false_start(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_plan_that_begins_elsewhere_is_an_error_and_no_motion(kind: str) -> None:
-    kind_of_board = on(kind)
+    kind_of_board = simulated_kind(kind)
     arm, machine = kind_of_board.arm, kind_of_board.machine
     counts, goal = machine.counts(), arm.home + np.deg2rad([5, -5, 5])
     foreign_plan = plan_joints(arm, goal, arm.home)
@@ -99,7 +99,7 @@ def test_joints_named_behind_lines_leave_the_others_where_the_lines_ended() -> N
 OUT = np.deg2rad([125.0, 90, -90])  # q1 goes to 120
 
 
-def jogged(kind_of_board: Kind, joint: int, rate: float, seconds: float) -> None:
+def run_jog(kind_of_board: Kind, joint: int, rate: float, seconds: float) -> None:
     """A jog at deg/s."""
     joint_rate = float(np.deg2rad(rate))
     assert kind_of_board.board.ready_to_jog(joint, joint_rate) == joint_rate
@@ -108,29 +108,29 @@ def jogged(kind_of_board: Kind, joint: int, rate: float, seconds: float) -> None
 
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "grbl", "klipper"])
 def test_an_arm_outside_its_limits_may_come_back_and_go_no_farther(kind: str) -> None:
-    kind_of_board = on(kind, OUT)
+    kind_of_board = simulated_kind(kind, OUT)
     arm, machine = kind_of_board.arm, kind_of_board.machine
     assert machine.position() == "known"
     begin = machine.counts()
     with pytest.raises(NoSolutionError, match=r"q1 = 12[45][.\d]* deg is outside -120 to 120 deg, where the arm"):
-        jogged(kind_of_board, 0, 5, 0.5)
+        run_jog(kind_of_board, 0, 5, 0.5)
     with pytest.raises(NoSolutionError, match=r"nothing was moved"):
         armkin.path(arm, {"moves": [{"line": [-230, 330, 300]}]}, start=machine.joints())
     farther = Trajectory(arm, machine.joints(), (straight_move(arm, machine.joints(), np.deg2rad([126, 95, -90])),))
     with pytest.raises(NoSolutionError, match=r"q1 = 12[45][.\d]* deg is outside"):
         machine.lay(farther, np.array(begin))
     assert machine.counts() == begin
-    jogged(kind_of_board, 0, -5, 0.4)
+    run_jog(kind_of_board, 0, -5, 0.4)
     machine.refresh()
     assert 122 < np.rad2deg(machine.joints()[0]) < 124.5
-    jogged(kind_of_board, 1, -5, 0.4)  # the others may move
+    run_jog(kind_of_board, 1, -5, 0.4)  # the others may move
     machine.run([machine.plan(machine.counts(), arm.home[None])])
     assert list(machine.counts()) == armkin.pulses(arm, arm.home).tolist()
 
 
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "grbl", "klipper"])
 def test_more_than_a_turn_outside_nobody_believes(kind: str) -> None:
-    near, far = (on(kind, np.deg2rad([120 + more, 90, -90])).machine for more in (359, 361))
+    near, far = (simulated_kind(kind, np.deg2rad([120 + more, 90, -90])).machine for more in (359, 361))
     near.refresh()
     far.refresh()
     assert (near.position(), far.position()) == ("known", "lost")
@@ -139,11 +139,11 @@ def test_more_than_a_turn_outside_nobody_believes(kind: str) -> None:
 
 
 def test_a_servo_bus_stands_where_it_measures() -> None:
-    kind_of_board = on("feetech", np.deg2rad([125.0, 90, -90]))
+    kind_of_board = simulated_kind("feetech", np.deg2rad([125.0, 90, -90]))
     assert kind_of_board.machine.position() == "known"
     with pytest.raises(NoSolutionError, match=r"q1 = 124\.98"):
-        jogged(kind_of_board, 0, 5, 0.5)
-    jogged(kind_of_board, 0, -20, 0.5)
+        run_jog(kind_of_board, 0, 5, 0.5)
+    run_jog(kind_of_board, 0, -20, 0.5)
     assert np.rad2deg(kind_of_board.machine.joints()[0]) == pytest.approx(115, abs=1.5)
 
 

@@ -43,7 +43,7 @@ def test_a_bend_counts_in_the_last_interval_as_often_as_the_device_adds_it_up(qu
         assert counts_to_segments._bend_count(ticks, quick) == round(65536 * last)
 
 
-def unheard(cut: list[Segment]) -> float:
+def unheard_cycles(cut: list[Segment]) -> float:
     """Cycles by which a line is ahead of its law, as nobody can tell before its first step."""
     first = cut[0]
     return 0.0 if first.add or any(first.steps) else first.ticks * first.interval * (1 / straight_lines.UNHEARD - 1)
@@ -57,7 +57,7 @@ def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, cloc
     """
     top, accel = law.peak * steps / law.length, law.accel * steps / law.length
     first = math.sqrt(1 / accel)  # half a step from rest
-    cycle = unheard(cut)
+    cycle = unheard_cycles(cut)
     before, speed, most, jump = 0.0, 0.0, 0.0, 0.0
     for s in cut:
         cycles, rate = intervals(s), abs(s.rates[axis])
@@ -75,7 +75,7 @@ def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, cloc
     return speed, most, jump
 
 
-def edges(cut: list[Segment], axis: int, clock: int) -> NDArray[np.float64]:
+def step_times(cut: list[Segment], axis: int, clock: int) -> NDArray[np.float64]:
     """Seconds at which an axis steps."""
     edge_times, cycle, place = [], 0, HALF
     for s in cut:
@@ -86,7 +86,7 @@ def edges(cut: list[Segment], axis: int, clock: int) -> NDArray[np.float64]:
     return np.concatenate(edge_times) / clock
 
 
-def windows(made: NDArray[np.float64], seconds: float) -> tuple[float, float]:
+def window_maxima(made: NDArray[np.float64], seconds: float) -> tuple[float, float]:
     """Greatest speed and acceleration that the steps in a window tell: a parabola through its ends and its middle."""
     last = np.searchsorted(made, made + seconds)
     k = np.flatnonzero((last < len(made)) & (last - np.arange(len(made)) >= 8))
@@ -99,7 +99,7 @@ def windows(made: NDArray[np.float64], seconds: float) -> tuple[float, float]:
     return float(((b - k) / (made[b] - made[k])).max()), float(np.abs(accel).max())
 
 
-def moves(name: str, count: int, seed: int) -> Iterator[tuple[list[Segment], Profile, NDArray[np.int64], int]]:
+def random_moves(name: str, count: int, seed: int) -> Iterator[tuple[list[Segment], Profile, NDArray[np.int64], int]]:
     """Random moves of a shipped arm at 1 to 100 % of its speed."""
     arm = arms.load_arm(f"robots/{name}.yaml")
     clock, least = CLOCKS[name]
@@ -116,14 +116,14 @@ def moves(name: str, count: int, seed: int) -> Iterator[tuple[list[Segment], Pro
 
 @pytest.mark.parametrize("name", CLOCKS)
 def test_no_tick_is_faster_or_speeds_up_faster_than_102_percent(name: str) -> None:
-    for cut, law, span, clock in moves(name, 12, 3):
+    for cut, law, span, clock in random_moves(name, 12, 3):
         axis = int(np.abs(span).argmax())
         steps = int(abs(span[axis]))
         speed, accel, jump = leaders_limits(cut, law, steps, axis, clock)
         assert speed <= 1.02
         assert accel <= 1.02
         assert jump <= 1.0
-        fastest, hardest = windows(edges(cut, axis, clock), 0.1)
+        fastest, hardest = window_maxima(step_times(cut, axis, clock), 0.1)
         assert fastest <= 1.02 * law.peak * steps / law.length
         # one tick's time at each of the window's ends and its middle
         tick = max(float(intervals(s).max()) for s in cut[1:-1]) / clock if len(cut) > 2 else 0.0
@@ -139,7 +139,7 @@ def test_fewer_pieces_keep_to_their_bound(pieces: Pieces, most: float) -> None:
         assert leaders_limits(list(move.segments), law, n, 0, 16_000_000)[1] <= most
 
 
-def refused(end: list[int], rate: float, accel: float, pause: float = 0.0) -> str:
+def board_refusal(end: list[int], rate: float, accel: float, pause: float = 0.0) -> str:
     """What the board says of a line from 0 that just keeps to its motors' bounds; n: counts/s and /s^2 of the first.
 
     pause: [s] that it waits for its queue in the segment before its first step, if it has one.
@@ -179,7 +179,7 @@ KNOWN = [
 
 @pytest.mark.parametrize(("end", "rate", "accel"), KNOWN)
 def test_lines_that_were_refused_are_taken(end: list[int], rate: float, accel: float) -> None:
-    assert refused(end, rate, accel) == ""
+    assert board_refusal(end, rate, accel) == ""
 
 
 def test_the_board_takes_random_lines() -> None:
@@ -192,10 +192,10 @@ def test_the_board_takes_random_lines() -> None:
             rate = min(math.sqrt(accel * n) * rng.uniform(0.98, 1.001), 16e6 / 448)
         end = [n, int(n * rng.uniform(-1, 1)), int(n * rng.uniform(-1, 1) * 10 ** rng.uniform(-3, 0))]
         pause = 10 ** rng.uniform(-3, -1.3)
-        assert refused(end, rate, accel, pause) == "", (end, rate, accel, pause)
+        assert board_refusal(end, rate, accel, pause) == "", (end, rate, accel, pause)
 
 
-def crude(seconds: float, share: float, within: float) -> bool:
+def board_takes(seconds: float, share: float, within: float) -> bool:
     """Whether the board takes pieces up to 12,000 steps/s at `share` of 20,000 steps/s^2; `within`: of their change."""
     image = Image((AxisImage(True, False, -(1 << 28), 1 << 28, 0, 20_000, 20_000),))
     velocity = Velocity(BOARDS["uno_cnc_shield"]._replace(min_interval=448), image)
@@ -218,9 +218,9 @@ def crude(seconds: float, share: float, within: float) -> bool:
 
 @pytest.mark.parametrize("seconds", [0.0001, 0.0002, 0.0005, 0.001, 0.002, 0.005, 0.01, 0.02, 0.05])
 def test_crude_plans_at_1_3_times_max_accel_are_refused_at_any_segment_length(seconds: float) -> None:
-    assert crude(seconds, 1.0, 0.0)
-    assert crude(seconds, 1.2, 0.0)
-    assert seconds < 0.002 or crude(seconds, 1.1, 0.5)  # in less, whole cycles of an interval are jumps
+    assert board_takes(seconds, 1.0, 0.0)
+    assert board_takes(seconds, 1.2, 0.0)
+    assert seconds < 0.002 or board_takes(seconds, 1.1, 0.5)  # in less, whole cycles of an interval are jumps
     for within in (0.0, 0.5, 1.0):
-        assert not crude(seconds, 1.3, within)
-        assert not crude(seconds, 2.48, within)
+        assert not board_takes(seconds, 1.3, within)
+        assert not board_takes(seconds, 2.48, within)

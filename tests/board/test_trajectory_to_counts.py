@@ -23,7 +23,7 @@ from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motion.timing import profile
 from armkin.motors import joints, pulses
-from quick import least
+from quick import least_seconds
 
 CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, counts_to_segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
@@ -51,7 +51,7 @@ def tick_times(cut: Iterable[Segment]) -> list[int]:
     return times
 
 
-def made(cut: Iterable[Segment], axis: int) -> list[int]:
+def counts_by_tick(cut: Iterable[Segment], axis: int) -> list[int]:
     """Net steps of an axis after every tick: the device's phases."""
     counts, place = [], 1 << 22
     for s in cut:
@@ -60,14 +60,14 @@ def made(cut: Iterable[Segment], axis: int) -> list[int]:
     return counts
 
 
-def unheard(segments: Iterable[Segment]) -> float:
+def unheard_seconds(segments: Iterable[Segment]) -> float:
     """Seconds by which a line is ahead of its law, as nobody can tell before its first step."""
     first = next(iter(segments))
     is_heard = first.add or any(first.steps)
     return 0.0 if is_heard else counts_to_segments.cycles_of(first) / CLOCK * (1 / straight_lines.UNHEARD - 1)
 
 
-def trapezoid(t: np.ndarray, length: float, top: float, accel: float) -> np.ndarray:
+def trapezoid_distance(t: np.ndarray, length: float, top: float, accel: float) -> np.ndarray:
     """Distance at time t, written down independently of the code under test."""
     peak = min(top, math.sqrt(accel * length))
     rise, duration = peak / accel, length / peak + peak / accel
@@ -101,12 +101,12 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
 
     # Every motor stays within a count (and a quarter: the device's parabolas) of its share of one trapezoid.
     peak = min(rate, math.sqrt(accel * n))
-    ahead = unheard(move.segments)
-    ideal = trapezoid(ahead + times / CLOCK, n, rate, accel) / n
+    ahead = unheard_seconds(move.segments)
+    ideal = trapezoid_distance(ahead + times / CLOCK, n, rate, accel) / n
     duration = n / peak + peak / accel
     assert ahead + move.cycles / CLOCK == pytest.approx(duration, rel=2e-3, abs=1e-4)
     for k, (a, b) in enumerate(zip(start, end, strict=True)):
-        counts_made = np.array(made(move.segments, k), dtype=np.int64)
+        counts_made = np.array(counts_by_tick(move.segments, k), dtype=np.int64)
         assert counts_made[-1] == b - a
         assert np.abs(counts_made - ideal * (b - a)).max() <= 1.25 + 2e-3 * n
         assert np.all(np.diff(counts_made, prepend=0) * np.sign(b - a) >= 0)  # monotone
@@ -116,7 +116,7 @@ def test_a_line_is_exact_coordinated_and_within_every_bound(start: list[int], da
     assert (per_tick / (gaps / CLOCK)).max() <= rate * 1.02
 
 
-def off(s: Segment) -> float:
+def end_tolerance(s: Segment) -> float:
     """Steps that a motor may be off at a segment's end: its rate rounded, and its ticks to whole cycles.
 
     A rate has 2^-16 step of rounding a tick, a fine one 2^-24 (PROTOCOL.md, section 6). An interval is cut to whole
@@ -149,7 +149,7 @@ def test_speed_changes_no_faster_than_the_acceleration(n: int, rate: float, acce
     mean = np.array([s.ticks * s.rates[0] / 2**23 for s in cut]) / h
     e = np.zeros(len(cut) + 1)
     for k, s in enumerate(cut):  # at the greatest rate, which is 2^-16 short of a step, nothing is made up for
-        e[k + 1] = off(s) + (e[k] if abs(s.rates[0]) == 2**23 - 128 else 0.0)
+        e[k + 1] = end_tolerance(s) + (e[k] if abs(s.rates[0]) == 2**23 - 128 else 0.0)
     allowed = (e[:-1] + e[1:]) / h
     assert np.all(np.abs(np.diff(mean)) <= accel * (h[:-1] + h[1:]) / 2 + allowed[:-1] + allowed[1:])
 
@@ -214,12 +214,12 @@ def test_a_queue_of_30_segments_always_reaches_to_a_stop(n: int, rate: float, ac
 def test_the_published_pose(three_dof: Arm) -> None:
     plan = plan_moves(three_dof, [0, 0, 0], np.deg2rad([-30, 5, -5]))
     assert plan.end.tolist() == [-1067, -10144, 5667]
-    assert [made(next(plan.moves()).segments, k)[-1] for k in range(3)] == [-1067, -10144, 5667]
+    assert [counts_by_tick(next(plan.moves()).segments, k)[-1] for k in range(3)] == [-1067, -10144, 5667]
     assert np.all(plan.trajectory.top_speed <= three_dof.max_speed * (1 + 1e-12))
     # 85 deg at 60 deg/s with ramps of 120 deg/s^2 take 1.917 s, less what rounding to steps has spared.
     assert plan.duration == pytest.approx(85 / 60 + 0.5, abs=1e-4)
     move = next(plan.moves())
-    assert unheard(move.segments) + move.cycles / CLOCK == pytest.approx(plan.duration, rel=1e-4)
+    assert unheard_seconds(move.segments) + move.cycles / CLOCK == pytest.approx(plan.duration, rel=1e-4)
 
 
 def test_a_trace_starts_and_ends_where_the_counts_do(three_dof: Arm) -> None:
@@ -317,6 +317,6 @@ def test_a_move_of_hours_is_planned_at_once_in_bounded_memory() -> None:
         assert sum(1 for _ in itertools.islice(move.segments, 2000)) == 2000
 
     tracemalloc.start()
-    assert least(planned, 5) < 5
+    assert least_seconds(planned, 5) < 5
     assert tracemalloc.get_traced_memory()[1] < 5e6
     tracemalloc.stop()

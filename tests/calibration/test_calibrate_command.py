@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from workshop import built, commands, measured
+from workshop import build_real_arm, measure_tips, random_commands
 
 import armkin
 from command_line import run
@@ -14,9 +14,9 @@ from command_line import run
 def test_the_command_writes_a_file_that_the_others_take(tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(13)
-    c = commands(arm, 40, rng)
+    c = random_commands(arm, 40, rng)
     csv, corrected = tmp_path / "rows.csv", tmp_path / "mine.yaml"
-    rows = np.concatenate([np.degrees(c), measured(built(arm, 13), c, rng)], axis=1)
+    rows = np.concatenate([np.degrees(c), measure_tips(build_real_arm(arm, 13), c, rng)], axis=1)
     np.savetxt(csv, rows, delimiter=",", header="q1,q2,q3,x,y,z", comments="")
     completed = run("calibrate", "three_dof", csv, "--out", corrected, "--json")
     assert completed.code == 0, completed.err
@@ -59,8 +59,8 @@ def test_poses_with_orientations_from_a_file(tmp_path: Path) -> None:
 
     arm = armkin.load("ur5e")
     rng = np.random.default_rng(14)
-    c = commands(arm, 30, rng)
-    T = built(arm, 14).poses(c)
+    c = random_commands(arm, 30, rng)
+    T = build_real_arm(arm, 14).poses(c)
     rows = np.concatenate([np.degrees(c), T[:, :3, 3], np.degrees(rpy(T[:, :3, :3]))], axis=1)
     csv = tmp_path / "rows.csv"
     np.savetxt(csv, rows, delimiter=",")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from workshop import built, commands, measured, rms
+from workshop import build_real_arm, measure_tips, random_commands, rms_distance
 
 import armkin
 from armkin import robot_file
@@ -18,7 +18,7 @@ from armkin.calibration.calibrate_arm import next_poses
 from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.errors import UsageError
 from armkin.model.build_arm import arm_of_file
-from quick import least
+from quick import least_seconds
 
 # arm, noise [mm], tip error on unseen poses that a prototype reached with 60 rows [mm]; the bar is 1.5 times as much
 FIGURES = [("ur5e", 0.1, 0.079), ("ar4", 0.1, 0.082), ("three_dof", 0.1, 0.064)]
@@ -30,7 +30,7 @@ def test_the_jacobian_is_exact(name: str) -> None:
     corrections = correction_model(arm)
     rng = np.random.default_rng(1)
     p = rng.normal(size=len(corrections.parameters)) * corrections.prior * 0.3
-    c = commands(arm, 5, rng)
+    c = random_commands(arm, 5, rng)
     T, J = corrections.poses(p, c)
     for k, parameter in enumerate(corrections.parameters):
         h = 1e-5 * max(parameter.prior, 1e-3)
@@ -50,7 +50,7 @@ def test_the_corrected_arm_is_the_model(name: str) -> None:
     corrections = correction_model(arm)
     rng = np.random.default_rng(2)
     p = rng.normal(size=len(corrections.parameters)) * corrections.prior * 0.3
-    c = commands(arm, 20, rng)
+    c = random_commands(arm, 20, rng)
     corrected, _ = corrections.corrected_arm(p)
     assert np.abs(armkin.fk(corrected, c) - corrections.poses(p, c)[0]).max() < 1e-9
     none = corrections.corrected_arm(np.zeros(len(p)))[0]
@@ -77,12 +77,12 @@ def test_a_built_arm_is_found(name: str, noise: float, figure: float) -> None:
     errors, ratios = [], []
     for seed in range(2):
         rng = np.random.default_rng(100 + seed)
-        real_arm = built(arm, seed)
-        c = commands(arm, 60, rng)
-        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, noise=noise))
-        unseen = commands(arm, 1000, rng)
-        errors.append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
-        ratios.append(errors[-1] / rms(armkin.fk(arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
+        real_arm = build_real_arm(arm, seed)
+        c = random_commands(arm, 60, rng)
+        calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, noise=noise))
+        unseen = random_commands(arm, 1000, rng)
+        errors.append(rms_distance(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
+        ratios.append(errors[-1] / rms_distance(armkin.fk(arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
         assert len(calibration.flagged) == 3  # 5 % of 60
         assert calibration.noise == pytest.approx(noise, rel=0.3)
     assert np.median(errors) <= 1.5 * figure
@@ -93,10 +93,10 @@ def test_a_file_that_is_right_stays() -> None:
     arm = armkin.load("three_dof")
     for seed in range(3):
         rng = np.random.default_rng(seed)
-        c = commands(arm, 30, rng)
+        c = random_commands(arm, 30, rng)
         calibration = armkin.calibrate(arm, c, armkin.fk(arm, c)[:, :3, 3] + rng.normal(size=(30, 3)) * 0.5)
-        unseen = commands(arm, 500, rng)
-        assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], armkin.fk(arm, unseen)[:, :3, 3]) < 0.5
+        unseen = random_commands(arm, 500, rng)
+        assert rms_distance(armkin.fk(calibration.arm, unseen)[:, :3, 3], armkin.fk(arm, unseen)[:, :3, 3]) < 0.5
 
 
 def test_four_rows_do_no_harm() -> None:
@@ -105,11 +105,11 @@ def test_four_rows_do_no_harm() -> None:
     worse = 0
     for seed in range(12):
         rng = np.random.default_rng(seed)
-        real_arm = built(arm, seed, base=False)
-        c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
-        tips = measured(real_arm, unseen, rng, wrong=0.0)
-        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
+        real_arm = build_real_arm(arm, seed, base=False)
+        c, unseen = random_commands(arm, 4, rng), random_commands(arm, 300, rng)
+        calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, wrong=0.0))
+        tips = measure_tips(real_arm, unseen, rng, wrong=0.0)
+        after, before = (rms_distance(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
         worse += after > 1.05 * before
     assert worse <= 1  # of 12; tests/bench/bench_calibration.py counts 200
 
@@ -123,10 +123,12 @@ def test_few_rows_show_that_the_base_stands_elsewhere(
     shares, seeds = [], sample(12, 6)
     for seed in range(seeds):
         rng = np.random.default_rng(500 + seed)
-        real_arm = built(arm, seed)
-        c, unseen = commands(arm, rows, rng), commands(arm, 300, rng)
-        calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
-        after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], real_arm.tips(unseen)) for a in (calibration.arm, arm))
+        real_arm = build_real_arm(arm, seed)
+        c, unseen = random_commands(arm, rows, rng), random_commands(arm, 300, rng)
+        calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, wrong=0.0))
+        after, before = (
+            rms_distance(armkin.fk(a, unseen)[:, :3, 3], real_arm.tips(unseen)) for a in (calibration.arm, arm)
+        )
         shares.append(after / before)
     assert np.sum(np.array(shares) < 0.75) >= moved * seeds // 12
     assert max(shares) < 1.05
@@ -137,43 +139,43 @@ def test_four_rough_rows_that_fit_by_chance_are_seen_through(seed: int) -> None:
     """Seeds of tests/bench/bench_calibration.py (1 mm of noise) where cross-validation alone chose a harmful fit."""
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(1000 + seed)
-    real_arm = built(arm, seed, base=False)
-    c, unseen = commands(arm, 4, rng), commands(arm, 300, rng)
-    calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, noise=1.0, wrong=0.0))
-    tips = measured(real_arm, unseen, rng, noise=1.0, wrong=0.0)
-    after, before = (rms(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
+    real_arm = build_real_arm(arm, seed, base=False)
+    c, unseen = random_commands(arm, 4, rng), random_commands(arm, 300, rng)
+    calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, noise=1.0, wrong=0.0))
+    tips = measure_tips(real_arm, unseen, rng, noise=1.0, wrong=0.0)
+    after, before = (rms_distance(armkin.fk(a, unseen)[:, :3, 3], tips) for a in (calibration.arm, arm))
     assert after <= 1.05 * before
 
 
 def test_one_row_in_five_may_be_wrong() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(9)
-    real_arm = built(arm, 9)
-    c = commands(arm, 60, rng)
-    calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.2))
-    unseen = commands(arm, 500, rng)
+    real_arm = build_real_arm(arm, 9)
+    c = random_commands(arm, 60, rng)
+    calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, wrong=0.2))
+    unseen = random_commands(arm, 500, rng)
     assert len(calibration.flagged) == 12
-    assert rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)) < 0.25
+    assert rms_distance(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)) < 0.25
 
 
 def test_poses_show_how_the_tool_is_turned() -> None:
     arm = armkin.load("ur5e")
     rng = np.random.default_rng(4)
-    real_arm = built(arm, 4)
-    c = commands(arm, 40, rng)
+    real_arm = build_real_arm(arm, 4)
+    c = random_commands(arm, 40, rng)
     T = real_arm.poses(c)
     T[:, :3, 3] += rng.normal(size=(40, 3)) * 0.1
     calibration = armkin.calibrate(arm, c, T)
-    unseen = commands(arm, 300, rng)
+    unseen = random_commands(arm, 300, rng)
     calibrated, want = armkin.fk(calibration.arm, unseen), real_arm.poses(unseen)
-    assert rms(calibrated[:, :3, 3], want[:, :3, 3]) < 0.15
+    assert rms_distance(calibrated[:, :3, 3], want[:, :3, 3]) < 0.15
     assert np.abs(np.swapaxes(calibrated[:, :3, :3], 1, 2) @ want[:, :3, :3] - np.eye(3)).max() < 3e-4
 
 
 def test_fixed_kinds_stay_and_zeros_alone_are_one_command() -> None:
     arm = armkin.load("three_dof")
     rng = np.random.default_rng(5)
-    c = commands(arm, 30, rng)
+    c = random_commands(arm, 30, rng)
     offsets = np.array([0.01, -0.02, 0.015])
     tips = armkin.fk(arm, c + offsets)[:, :3, 3]
     calibration = armkin.calibrate(arm, c, tips, fix=[kind for kind in KINDS if kind != "zeros"])
@@ -190,8 +192,8 @@ def test_fixed_kinds_stay_and_zeros_alone_are_one_command() -> None:
 def test_what_rows_cannot_show_is_named_and_stays() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(6)
-    c = commands(arm, 40, rng)
-    calibration = armkin.calibrate(arm, c, measured(built(arm, 6), c, rng))
+    c = random_commands(arm, 40, rng)
+    calibration = armkin.calibrate(arm, c, measure_tips(build_real_arm(arm, 6), c, rng))
     unseen = "; ".join(calibration.unseen)
     assert "J6 zero" in unseen  # the tip is on the last axis
     assert "base z" in unseen
@@ -213,15 +215,15 @@ def test_tasks_that_need_parallel_axes_keep_them() -> None:
     q = c[0]
     s = armkin.ik(again, [*armkin.fk(again, q)[:3, 3], 1.003 * q[1:].sum()], near=q)
     assert s.valid.any()
-    assert rms(armkin.fk(again, c)[:, :3, 3], tips) < 0.12
+    assert rms_distance(armkin.fk(again, c)[:, :3, 3], tips) < 0.12
 
 
 @pytest.mark.parametrize("name", ["ur5e", "three_dof"])
 def test_the_file_says_the_arm_and_is_solved(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name)
     rng = np.random.default_rng(8)
-    c = commands(arm, 40, rng)
-    calibration = armkin.calibrate(arm, c, measured(built(arm, 8), c, rng))
+    c = random_commands(arm, 40, rng)
+    calibration = armkin.calibrate(arm, c, measure_tips(build_real_arm(arm, 8), c, rng))
     path = tmp_path / "calibrated.yaml"
     path.write_text(calibration.text)
     again = armkin.load(path)
@@ -243,11 +245,11 @@ def test_suggested_poses_tell_more_than_random_ones() -> None:
     errors: dict[str, list[float]] = {"suggested": [], "random": []}
     for seed in range(2):
         rng = np.random.default_rng(seed)
-        real_arm = built(arm, seed)
-        unseen = commands(arm, 500, rng)
-        for how, c in (("suggested", poses), ("random", commands(arm, 15, rng))):
-            calibration = armkin.calibrate(arm, c, measured(real_arm, c, rng, wrong=0.0))
-            errors[how].append(rms(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
+        real_arm = build_real_arm(arm, seed)
+        unseen = random_commands(arm, 500, rng)
+        for how, c in (("suggested", poses), ("random", random_commands(arm, 15, rng))):
+            calibration = armkin.calibrate(arm, c, measure_tips(real_arm, c, rng, wrong=0.0))
+            errors[how].append(rms_distance(armkin.fk(calibration.arm, unseen)[:, :3, 3], real_arm.tips(unseen)))
     assert np.mean(errors["suggested"]) < np.mean(errors["random"])
     with pytest.raises(UsageError, match="ask for 1 to 1000"):
         next_poses(arm, 0)
@@ -256,9 +258,9 @@ def test_suggested_poses_tell_more_than_random_ones() -> None:
 def test_200_rows_take_at_most_3_seconds() -> None:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(12)
-    c = commands(arm, 200, rng)
-    x = measured(built(arm, 12), c, rng)
-    assert least(lambda: armkin.calibrate(arm, c, x), 3) < 3
+    c = random_commands(arm, 200, rng)
+    x = measure_tips(build_real_arm(arm, 12), c, rng)
+    assert least_seconds(lambda: armkin.calibrate(arm, c, x), 3) < 3
 
 
 def test_the_page_s_python_runs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from workshop import built, commands, measured
+from workshop import build_real_arm, measure_tips, random_commands
 
 import armkin
 from armkin.errors import UsageError
@@ -16,7 +16,7 @@ from command_line import run
 def bad_rows(how: str) -> tuple[np.ndarray, np.ndarray]:
     arm = armkin.load("ar4")
     rng = np.random.default_rng(10)
-    c = commands(arm, 40, rng)
+    c = random_commands(arm, 40, rng)
     if how == "still":
         c[:, 2] = 0.3
     if how == "in step":
@@ -25,7 +25,7 @@ def bad_rows(how: str) -> tuple[np.ndarray, np.ndarray]:
         c = np.zeros((40, 6))
         c[:, 3:] = rng.uniform(-1, 1, (40, 3))
         c[:, :3] = rng.uniform(-1e-2, 1e-2, (40, 3))
-    x = measured(built(arm, 10), c, rng)
+    x = measure_tips(build_real_arm(arm, 10), c, rng)
     if how == "line":
         x = x[0] + np.linspace(0, 100, 40)[:, None] * [1.0, 2.0, 0.5] + rng.normal(size=(40, 3)) * 0.1
     return {
@@ -78,7 +78,7 @@ def test_a_measuring_frame_may_stand_anywhere() -> None:
     """A frame half a turn and a metre away is a base, not a mistake."""
     arm = armkin.load("ar4")
     rng = np.random.default_rng(11)
-    c = commands(arm, 40, rng)
+    c = random_commands(arm, 40, rng)
     away = armkin.fk(arm, c)[:, :3, 3] @ np.array([[-1, 0, 0], [0, -1, 0], [0, 0, 1]]) + [1000, 0, 0]
     calibration = armkin.calibrate(arm, c, away + rng.normal(size=(40, 3)) * 0.1)
     assert np.median(calibration.after) < 0.4

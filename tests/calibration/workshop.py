@@ -37,7 +37,7 @@ class Built:
         return armkin.fk(self.arm, c * self.ratio)
 
 
-def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
+def build_real_arm(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
     """A built arm: every number of its table a bit off."""
     rng = np.random.default_rng(seed)
     data: dict[str, Any] = conventions.dh(arm)
@@ -59,14 +59,16 @@ def built(arm: armkin.Arm, seed: int, *, base: bool = True) -> Built:
     return Built(real_arm, 1.0 + 0.002 * rng.normal(size=arm.n))
 
 
-def commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
+def random_commands(arm: armkin.Arm, count: int, rng: np.random.Generator) -> Array:
     """Random commanded values within limits."""
     low = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
     high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
     return rng.uniform(low, high, (count, arm.n))
 
 
-def measured(real_arm: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05) -> Array:
+def measure_tips(
+    real_arm: Built, c: Array, rng: np.random.Generator, *, noise: float = 0.1, wrong: float = 0.05
+) -> Array:
     """Tips as measured: with noise [mm] a coordinate, and a share of rows wrong by 5 mm."""
     x = real_arm.tips(c) + rng.normal(size=(len(c), 3)) * noise
     bad = rng.choice(len(c), round(wrong * len(c)), replace=False)
@@ -75,6 +77,6 @@ def measured(real_arm: Built, c: Array, rng: np.random.Generator, *, noise: floa
     return x
 
 
-def rms(a: Array, b: Array) -> float:
+def rms_distance(a: Array, b: Array) -> float:
     """Root mean square distance of points (M, 3)."""
     return float(np.sqrt(((a - b) ** 2).sum(axis=1).mean()))

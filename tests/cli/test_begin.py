@@ -21,7 +21,7 @@ import pytest
 import armkin
 from armkin.board.kinds.firmware import FirmwareBoard
 from command_line import ROOT, Result, run
-from person import ENTER, Person, seen
+from person import ENTER, Person, keys_for_direction
 
 
 @pytest.fixture
@@ -46,7 +46,19 @@ def begin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tupl
 
 
 def test_the_file_is_corrected_and_its_comments_stay(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
-    keys = [*seen("y"), *seen("n"), *seen("y"), "y", "3", "-", "[", ENTER, "y", "y", "y"]
+    keys = [
+        *keys_for_direction("y"),
+        *keys_for_direction("n"),
+        *keys_for_direction("y"),
+        "y",
+        "3",
+        "-",
+        "[",
+        ENTER,
+        "y",
+        "y",
+        "y",
+    ]
     before = (ROOT / "robots/three_dof.yaml").read_text()
     completed, person, path = begin("three_dof", keys, looks=100)
     assert completed.code == 0, completed.err
@@ -76,7 +88,9 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
 
     monkeypatch.setattr(FirmwareBoard, "jog", noted)
     first = ["+", "+", "-", "-", ENTER, "a", "+", "-", ENTER, "y"]
-    completed, person, _ = begin("three_dof", [*first, *seen("s"), *seen("s"), "y", ENTER, "s"])
+    completed, person, _ = begin(
+        "three_dof", [*first, *keys_for_direction("s"), *keys_for_direction("s"), "y", ENTER, "s"]
+    )
     assert completed.code == 0, completed.err
     assert "nothing to correct" in completed.err
     assert {round(share, 6) for share, _ in jogs} == {0.1}
@@ -87,7 +101,7 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
 
 
 def test_no_is_no_and_a_shipped_robot_stays(begin: Callable[..., tuple[Result, Person, Path]], tmp_path: Path) -> None:
-    keys = [*seen("n"), *seen("y"), *seen("y"), "y", ENTER, "s", "n"]
+    keys = [*keys_for_direction("n"), *keys_for_direction("y"), *keys_for_direction("y"), "y", ENTER, "s", "n"]
     completed, _, path = begin("three_dof", keys)
     assert completed.code == 0, completed.err
     assert "nothing was written" in completed.err
@@ -98,7 +112,7 @@ def test_no_is_no_and_a_shipped_robot_stays(begin: Callable[..., tuple[Result, P
 
 
 def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
-    keys = [*seen("y") * 3, "y", "1", "]", "2", "+", "]", "q", ENTER, "y", "n", "y"]
+    keys = [*keys_for_direction("y") * 3, "y", "1", "]", "2", "+", "]", "q", ENTER, "y", "n", "y"]
     completed, _, path = begin("three_dof", keys, looks=50)
     assert completed.code == 0, completed.err
     assert "the check was not passed" in completed.err
@@ -109,7 +123,9 @@ def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tu
 def test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board(
     begin: Callable[..., tuple[Result, Person, Path]],
 ) -> None:
-    completed, _, path = begin("puma560", [*seen("n"), *seen("y") * 5, "y", ENTER, "y", "y"])
+    completed, _, path = begin(
+        "puma560", [*keys_for_direction("n"), *keys_for_direction("y") * 5, "y", ENTER, "y", "y"]
+    )
     assert completed.code == 0, completed.err
     assert completed.err.count("assumed for the simulation alone") == 1
     assert "nothing to correct" in completed.err, "what is assumed is no file's"
@@ -119,7 +135,9 @@ def test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board(
 
 def test_bus_servos_are_put_to_their_zeros_by_hand(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
     joints = armkin.load("so101").n
-    completed, person, _ = begin("so101", [*seen("y") * joints, "y", ENTER, ENTER, "y", "y", "y"], looks=3)
+    completed, person, _ = begin(
+        "so101", [*keys_for_direction("y") * joints, "y", ENTER, ENTER, "y", "y", "y"], looks=3
+    )
     assert completed.code == 0, completed.err
     assert any("servos will be switched off" in text for text in person.heard)
     assert "zero" in completed.out or "nothing to correct" in completed.err

@@ -22,7 +22,7 @@ from command_line import ROOT, run
 DOF = "three_dof"
 
 
-def check(value: Any, hint: Any, context: str) -> None:
+def check_type(value: Any, hint: Any, context: str) -> None:
     """Hold a JSON value to a type: no key more, none less, no number that is not finite."""
     origin, parts = get_origin(hint), get_args(hint)
     if is_typeddict(hint):
@@ -31,28 +31,28 @@ def check(value: Any, hint: Any, context: str) -> None:
         assert not value.keys() - hints.keys(), f"{context}: keys without a type"
         assert not hint.__required_keys__ - value.keys(), f"{context}: keys missing"
         for key, inner in value.items():
-            check(inner, hints[key], f"{context}.{key}")
+            check_type(inner, hints[key], f"{context}.{key}")
     elif origin is NotRequired:
-        check(value, parts[0], context)
+        check_type(value, parts[0], context)
     elif origin is Literal:
         assert value in parts, context
     elif origin in (Union, types.UnionType):
-        kinds = [part for part in parts if _fits(value, part)]
+        kinds = [part for part in parts if _fits_type(value, part)]
         assert kinds, f"{context}: {value!r}"
-        check(value, kinds[0], context)
+        check_type(value, kinds[0], context)
     elif origin is list:
         assert isinstance(value, list), context
         for i, inner in enumerate(value):
-            check(inner, parts[0], f"{context}[{i}]")
+            check_type(inner, parts[0], f"{context}[{i}]")
     elif origin is dict:
         assert isinstance(value, dict), context
         for key, inner in value.items():
-            check(inner, parts[1], f"{context}.{key}")
+            check_type(inner, parts[1], f"{context}.{key}")
     elif hint is not Any:
-        assert _fits(value, hint), f"{context}: {value!r}"
+        assert _fits_type(value, hint), f"{context}: {value!r}"
 
 
-def _fits(value: Any, hint: Any) -> bool:
+def _fits_type(value: Any, hint: Any) -> bool:
     if hint is type(None):
         return value is None
     if hint is float:
@@ -106,16 +106,16 @@ CASES: list[tuple[type, tuple[object, ...]]] = [
     ("kind", "words"), CASES, ids=lambda part: " ".join(map(str, part)) if type(part) is tuple else ""
 )
 def test_an_answer_has_its_keys_and_types(kind: type, words: tuple[object, ...], tmp_path: Path) -> None:
-    made = {"CSV": measured, "SWITCHED": switched, "TARGETS": targets}
+    made = {"CSV": measured_file, "SWITCHED": switched_file, "TARGETS": targets_file}
     completed = run(*(made[str(word)](tmp_path) if word in made else word for word in words), "--json")
     assert completed.code in (0, 3), completed.err
-    check(completed.json, kind, kind.__name__)
+    check_type(completed.json, kind, kind.__name__)
     if completed.code:
         error = json.loads(completed.err)
-        check({key: error[key] for key in get_type_hints(answers.Error) if key in error}, answers.Error, "Error")
+        check_type({key: error[key] for key in get_type_hints(answers.Error) if key in error}, answers.Error, "Error")
 
 
-def measured(folder: Path) -> Path:
+def measured_file(folder: Path) -> Path:
     """Thirty poses of an arm that stands 5 mm beside its table, one of them a slip."""
     arm = armkin.load(DOF)
     q = np.random.default_rng(3).uniform(arm.lower, arm.upper, (30, arm.n))
@@ -125,13 +125,13 @@ def measured(folder: Path) -> Path:
     return folder / "tips.csv"
 
 
-def targets(folder: Path) -> Path:
+def targets_file(folder: Path) -> Path:
     """Two targets of an arm that may stand anywhere."""
     (folder / "targets.csv").write_text("x,y,z\n600,0,200\n600,300,200\n")
     return folder / "targets.csv"
 
 
-def switched(folder: Path) -> Path:
+def switched_file(folder: Path) -> Path:
     """The arm with a limit switch on every joint."""
     text = (ROOT / "robots" / "three_dof.yaml").read_text()
     for axis, switch_value in zip("XYZ", (-20, 75, -105), strict=True):
@@ -143,7 +143,7 @@ def switched(folder: Path) -> Path:
 
 def test_a_batch_has_one_a_row() -> None:
     for line in run("ik", DOF, "--batch", "-", "--json", stdin=b"390,80,300\n900,0,0\n").lines:
-        check(line, answers.Ik, "Ik")
+        check_type(line, answers.Ik, "Ik")
 
 
 @pytest.mark.parametrize(
@@ -152,7 +152,7 @@ def test_a_batch_has_one_a_row() -> None:
 )
 def test_a_wrong_answer_is_noticed(value: Any) -> None:
     with pytest.raises(AssertionError):
-        check(value, answers.Head, "Head")
+        check_type(value, answers.Head, "Head")
 
 
 def test_every_command_with_json_has_a_type_and_a_case() -> None:

@@ -63,7 +63,7 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         assert {100, 101, 102} <= {row["setting"] for row in completed.json["differences"] if row["serious"]}
         assert board.settings[100] == 250
         assert run("setup", grbl, "--port", pty.name, "--write").code == 0
-        written = {number: value for number, (_, value) in _wanted(grbl).items() if number != 10}
+        written = {number: value for number, (_, value) in _expected_settings(grbl).items() if number != 10}
         assert {number: board.settings[number] for number in written} == pytest.approx(written)
         lost = run("send", grbl, -3, 85, -85, "--port", pty.name)
         assert (lost.code, "position is lost" in lost.err) == (5, True)
@@ -78,7 +78,7 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         assert run("status", grbl, "--port", pty.name, "--json").json["position"] == "lost"
 
 
-def _wanted(robot: str) -> dict[int, tuple[str, float]]:
+def _expected_settings(robot: str) -> dict[int, tuple[str, float]]:
     return expected_settings(axes_of(armkin.load(robot)))
 
 
@@ -152,9 +152,9 @@ def homed(grbl: str) -> str:
     return grbl
 
 
-def fitted(robot: str, **more: float) -> Grbl:
+def grbl_for(robot: str, **more: float) -> Grbl:
     """A GRBL board as the robot file wants it."""
-    settings = {number: value for number, (_, value) in _wanted(robot).items()}
+    settings = {number: value for number, (_, value) in _expected_settings(robot).items()}
     return Grbl(
         axes=3, settings=settings | {int(key[1:]): value for key, value in more.items()}, ends={0: 0, 1: 0, 2: 0}
     )
@@ -164,7 +164,7 @@ def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(homed: s
     rehearsed = run("home", homed, "--port", "sim", "--json")
     assert rehearsed.json["joints"] == pytest.approx([0, 90, -90], abs=0.03)
     assert "moving to the home pose" in rehearsed.err
-    board = fitted(homed)
+    board = grbl_for(homed)
     with PtyPort(board) as pty:
         at_switches = run("home", homed, "--port", pty.name, "--stay", "--json").json
         assert at_switches["joints"] == pytest.approx([119, -19, 119], abs=0.03)  # $27 = 1 deg off the switches
@@ -175,7 +175,7 @@ def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(homed: s
 
 
 def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> None:
-    board = fitted(homed, s23=0)
+    board = grbl_for(homed, s23=0)
     with PtyPort(board) as pty:
         refused = run("home", homed, "--port", pty.name)
         assert (refused.code, board.steps) == (5, [0, 0, 0])
@@ -186,7 +186,7 @@ def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> No
 
 
 def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(homed: str) -> None:
-    board = fitted(homed)
+    board = grbl_for(homed)
     with PtyPort(board) as pty:
         completed = run("grip", homed, "closed", "--port", pty.name, "--json")
         assert (board.spindle, completed.json["gripper"], completed.json["measured"]) == (200, 200, False)
@@ -238,7 +238,7 @@ def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path:
     path, wide = tmp_path / "path.yaml", tmp_path / "wide.yaml"
     path.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: closed\n  - joint: [0, 90, -90]\n")
     wide.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: 999\n")
-    board = fitted(homed)
+    board = grbl_for(homed)
     with PtyPort(board) as pty:
         refused = run("path", homed, wide, "--port", pty.name, "--assume-home")
         assert (refused.code, board.steps[:3]) == (2, [0, 0, 0])
@@ -265,7 +265,7 @@ def test_a_path_grips_with_a_servo_on_the_bus(tmp_path: Path) -> None:
 
 def test_stop_leaves_a_board_of_others_alone_once_its_own_process_has_stopped_it(grbl: str) -> None:
     """Our firmware's frames are noise to GRBL, and a byte of them may reset it: the position would be lost."""
-    board = Grbl(axes=3, settings={number: value for number, (_, value) in _wanted(grbl).items()})
+    board = Grbl(axes=3, settings={number: value for number, (_, value) in _expected_settings(grbl).items()})
     with PtyPort(board) as pty:
         words = ["send", grbl, "60", "20", "-60", "--speed", "5", "--assume-home", "--port", pty.name]
         mover = subprocess.Popen([sys.executable, "-m", "armkin", *words], stderr=subprocess.PIPE, text=True)

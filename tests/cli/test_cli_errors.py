@@ -21,7 +21,7 @@ SOURCE = Path(__file__).parents[2] / "src" / "armkin"
 DOF = "robots/three_dof.yaml"
 
 
-def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
+def error_of(*words: object, stdin: bytes = b"") -> dict[str, Any]:
     """The error of a command line under --json, whose stdout must be empty."""
     completed = run(*words, "--json", stdin=stdin)
     assert completed.out == ""
@@ -45,7 +45,7 @@ def failed(*words: object, stdin: bytes = b"") -> dict[str, Any]:
     ],
 )
 def test_an_error_is_one_object(words: tuple[object, ...], expected: dict[str, Any]) -> None:
-    answer = failed(*words)
+    answer = error_of(*words)
     assert answer["error"]
     assert {key: answer[key] for key in expected} == expected
 
@@ -53,7 +53,7 @@ def test_an_error_is_one_object(words: tuple[object, ...], expected: dict[str, A
 def test_an_invalid_robot_file_names_its_line(tmp_path: Path) -> None:
     path = tmp_path / "bad.yaml"
     path.write_text("name: bad\nconvention: standard\njoints: [{name: q1, dh: {alpha: 0, a: 1, d: 2}}]\nbored: 1\n")
-    answer = failed("info", path)
+    answer = error_of("info", path)
     assert (answer["kind"], answer["exit_code"], answer["file"], answer["line"]) == ("robot_file", 4, str(path), 4)
 
 

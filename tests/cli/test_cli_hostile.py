@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ROOT, THREE_DOF, Result, run
-from quick import least
+from quick import least_seconds
 
 SNAPSHOT = ROOT / "tests/snapshots/cli_errors.txt"
 DOF = THREE_DOF
@@ -180,22 +180,22 @@ def folder(tmp_path: Path) -> Iterator[Path]:
         assert sorted(tmp_path.iterdir()) == before
 
 
-def outcome(name: str, folder: Path) -> Result:
+def run_case(name: str, folder: Path) -> Result:
     _, words, stdin = CASES[name]
     completed = run(*(word.replace("@", str(folder)) for word in words), stdin=stdin, cwd=folder / "here")
     return completed._replace(err=completed.err.replace(str(folder), "FOLDER"))
 
 
-def shown(text: str) -> str:
+def shorten_text(text: str) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def block(name: str, completed: Result) -> str:
-    quoted = (repr(w) if not w or " " in w or not w.isprintable() else shown(w) for w in CASES[name][1])
-    return f"[{name}]\n$ armkin {shown(' '.join(quoted))}\nexit {completed.code}\n{completed.err.strip()}"
+def snapshot_block(name: str, completed: Result) -> str:
+    quoted = (repr(w) if not w or " " in w or not w.isprintable() else shorten_text(w) for w in CASES[name][1])
+    return f"[{name}]\n$ armkin {shorten_text(' '.join(quoted))}\nexit {completed.code}\n{completed.err.strip()}"
 
 
-def snapshots() -> dict[str, str]:
+def read_snapshots() -> dict[str, str]:
     blocks = SNAPSHOT.read_text().strip().split("\n\n")
     return {text.partition("]")[0].removeprefix("["): text for text in blocks}
 
@@ -204,7 +204,7 @@ def snapshots() -> dict[str, str]:
 def test_hostile(name: str, folder: Path) -> None:
     run("info", DOF)  # the imports are not the command line's time
     results: list[Result] = []
-    seconds = least(lambda: results.append(outcome(name, folder)), 2, time.monotonic)
+    seconds = least_seconds(lambda: results.append(run_case(name, folder)), 2, time.monotonic)
     completed = results[0]
     code = CASES[name][0]
     assert completed.code == code, completed.err
@@ -222,13 +222,13 @@ def test_hostile(name: str, folder: Path) -> None:
     assert seconds < 2
     assert [path.name for path in (folder / "here").iterdir()] == ["robots"]
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
-        blocks = {**snapshots(), name: block(name, completed)}
+        blocks = {**read_snapshots(), name: snapshot_block(name, completed)}
         SNAPSHOT.write_text("\n\n".join(blocks[key] for key in CASES if key in blocks) + "\n")
-    assert block(name, completed) == snapshots()[name]
+    assert snapshot_block(name, completed) == read_snapshots()[name]
 
 
 def test_every_snapshot_belongs_to_a_case() -> None:
-    assert list(snapshots()) == list(CASES)
+    assert list(read_snapshots()) == list(CASES)
     assert len(CASES) >= 80
 
 

@@ -21,7 +21,7 @@ ROBOT = str(ROOT / "tests/robots/three_dof_klipper.yaml")
 AXES = axes_of(armkin.load(ROBOT))
 
 
-def pins(port: Klipper) -> list[int]:
+def pin_counts(port: Klipper) -> list[int]:
     return [round((port.at[axis.section] - axis.at_home) * axis.steps) for axis in AXES]
 
 
@@ -32,7 +32,7 @@ def test_a_new_klipper_is_told_where_the_arm_stands_then_moved(tmp_path: Path) -
         assert (lost.code, "position is lost" in lost.err, "--assume-home" in lost.err) == (5, True, True)
         moved = run("send", ROBOT, -3, 85, -85, "--port", port.name, "--assume-home", "--json")
         assert moved.code == 0, moved.err
-        assert moved.json["pulses"] == pins(board) == [-107, -597, 333]
+        assert moved.json["pulses"] == pin_counts(board) == [-107, -597, 333]
         assert "a stop takes effect when Klipper has carried out what it holds" in lost.err  # once a day
         status = run("status", ROBOT, "--port", port.name, "--json").json
         assert (status["position"], status["state"], status["settings"]) == ("known", "ready", [])
@@ -59,7 +59,7 @@ def test_stop_ends_the_motion_of_another_terminal(tmp_path: Path) -> None:
         assert "stopped: the arm stands at q1 = " in output
         stands = run("status", ROBOT, "--port", port.name, "--json").json
         assert stands["position"] == "known"
-        assert stands["pulses"] == pins(board)
+        assert stands["pulses"] == pin_counts(board)
         assert 0 < stands["pulses"][0] < 2133
         nobody = run("stop", "--port", port.name)
         assert (nobody.code, "no armkin moves an arm by" in nobody.err) == (2, True)

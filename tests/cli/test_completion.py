@@ -11,7 +11,7 @@ from armkin.robot_file import catalogue
 from command_line import ROOT, run, run_process
 
 
-def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
+def offered_words(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
     """What Tab offers at the end of a line."""
     words = line.split()
     index = len(words) if line.endswith(" ") else len(words) - 1
@@ -44,7 +44,7 @@ def offered(monkeypatch: pytest.MonkeyPatch, line: str) -> list[str]:
     ],
 )
 def test_tab(line: str, expected: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    words_offered = offered(monkeypatch, line)
+    words_offered = offered_words(monkeypatch, line)
     assert (
         sorted(words_offered) == sorted(expected)
         if expected

@@ -11,7 +11,7 @@ import pytest
 from command_line import run
 
 
-def pasted(text: str, lines: list[str]) -> str:
+def paste_lines(text: str, lines: list[str]) -> str:
     """The file with every line where its comment says: to joints, or at the end."""
     for line in lines:
         if "in place of board:" in line:
@@ -40,11 +40,11 @@ def test_pasted_lines_make_a_file_that_moves(robot: str, tmp_path: Path) -> None
     assert refused.code == 2
 
     rehearsal = tmp_path / "rehearsal.yaml"
-    rehearsal.write_text(pasted(copy.read_text(), json.loads(refused.err)["lines_to_add"]))
+    rehearsal.write_text(paste_lines(copy.read_text(), json.loads(refused.err)["lines_to_add"]))
     assert run("send", rehearsal, "home", "--dry-run").code == 0
 
     complete = tmp_path / "whole.yaml"
-    complete.write_text(pasted(copy.read_text(), lines))
+    complete.write_text(paste_lines(copy.read_text(), lines))
     assert run("info", complete, "--json").json["lacks"]["send"] == []
     assert run("send", complete, "home", "--port", "sim").code == 0
 

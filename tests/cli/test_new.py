@@ -18,7 +18,7 @@ from command_line import ROOT, run
 TABLE = ["--dh", "90,0,170", "--dh", "0,197,-10", "--dh", "0,258,0"]
 
 
-def made(*words: object, stdin: bytes = b"") -> robot_file.RobotFile:
+def file_made(*words: object, stdin: bytes = b"") -> robot_file.RobotFile:
     """The robot file that a command line writes to standard output."""
     completed = run("new", "arm", *words, "--out", "-", stdin=stdin)
     assert completed.code == 0, completed.err
@@ -42,7 +42,7 @@ def test_a_table_becomes_an_arm(tmp_path: Path) -> None:
 
 def test_entries_as_papers_write_them() -> None:
     rows = ["--dh", "pi/2,0,170,q1", "--dh", "-pi/2,0.5,d2", "--dh", "0,258,0,q3 - 90", "--dh", "0,1,2,theta4+pi/2"]
-    file = made(*rows, "--convention", "modified")
+    file = file_made(*rows, "--convention", "modified")
     assert [joint.type for joint in file.joints] == ["revolute", "prismatic", "revolute", "revolute"]
     tables = [joint.dh for joint in file.joints]
     assert [dh and (dh.alpha, dh.a, dh.d, dh.theta) for dh in tables] == [
@@ -56,11 +56,11 @@ def test_entries_as_papers_write_them() -> None:
 def test_a_csv_table() -> None:
     text = b"# a comment\nname,d,alpha,a,type,lower,upper,theta\n"
     text += b"base,170,90,0,,-120,120,\nlift,0,0,0,prismatic,10,300,45\n"
-    file = made("--batch", "-", "--convention", "standard", stdin=text)
+    file = file_made("--batch", "-", "--convention", "standard", stdin=text)
     base, lift = file.joints
     assert (base.name, base.limits, base.home) == ("base", (-120, 120), 0)
     assert (lift.type, lift.limits, lift.home) == ("prismatic", (10, 300), 10)
-    plain = made("--batch", "-", "--convention", "standard", stdin=b"90,0,170\n0,1e-7,0,45\n")
+    plain = file_made("--batch", "-", "--convention", "standard", stdin=b"90,0,170\n0,1e-7,0,45\n")
     assert plain.joints[1].dh is not None
     assert (plain.joints[1].dh.a, plain.joints[1].dh.theta) == (1e-7, 45)
 
@@ -123,21 +123,21 @@ def test_the_questions_of_a_terminal(tmp_path: Path) -> None:
     assert (second.dh.a, second.dh.theta, second.limits) == (200, 45, None)
 
 
-def keys(part: Any) -> set[str]:
+def key_names(part: Any) -> set[str]:
     """All names of keys in a schema."""
     if isinstance(part, list):
-        return {key for item in part for key in keys(item)}
+        return {key for item in part for key in key_names(item)}
     if not isinstance(part, dict):
         return set()
     names = set(part.get("properties", ()))
-    return names | {key for value in part.values() for key in keys(value)}
+    return names | {key for value in part.values() for key in key_names(value)}
 
 
 def test_the_example_shows_every_key() -> None:
     path = ROOT / "examples/every_key.yaml"
     text = path.read_text()
     schema = json.loads(run("schema").out)
-    expected = keys(schema["properties"]) | keys(schema["$defs"])
+    expected = key_names(schema["properties"]) | key_names(schema["$defs"])
     missing = {key for key in expected if f"{key}:" not in text}
     assert len(expected) > 45
     assert not missing

@@ -12,7 +12,7 @@ TARGETS = b"x,y,z\n390,80,300\n9000,0,0\n0,400,200\n"
 ANSWER = run("fk", THREE_DOF, 1, 2, 3, "--json").out.encode()
 
 
-def piped(first: Result, *words: object) -> Result:
+def run_piped(first: Result, *words: object) -> Result:
     return run(*words, stdin=first.out.encode())
 
 
@@ -20,21 +20,21 @@ def test_json_of_ik_goes_into_fk_and_pulses() -> None:
     answer = run("ik", THREE_DOF, 390, 80, 300, "--json")
     best = answer.json["branches"][0]["joints"]
     for robot in ([], [THREE_DOF], ["three_dof"]):
-        assert piped(answer, "fk", *robot, "--json").json["joints"] == best
-        assert piped(answer, "pulses", *robot, "--json").json["joints"] == best
-    assert piped(answer, "fk", "--json").json["position_mm"] == pytest.approx([390, 80, 300])
-    assert piped(piped(answer, "fk", "--json"), "pulses", "--json").json["joints"] == best
-    assert "390.0000" in piped(answer, "fk").out
+        assert run_piped(answer, "fk", *robot, "--json").json["joints"] == best
+        assert run_piped(answer, "pulses", *robot, "--json").json["joints"] == best
+    assert run_piped(answer, "fk", "--json").json["position_mm"] == pytest.approx([390, 80, 300])
+    assert run_piped(run_piped(answer, "fk", "--json"), "pulses", "--json").json["joints"] == best
+    assert "390.0000" in run_piped(answer, "fk").out
 
 
 def test_json_lines_are_a_batch_and_unsolved_answers_are_skipped() -> None:
     answers = run("ik", THREE_DOF, "--batch", "-", "--json", stdin=TARGETS)
-    completed = piped(answers, "fk")
+    completed = run_piped(answers, "fk")
     assert completed.code == 0
     assert len(completed.out.splitlines()) == 3
     assert completed.err == "warning: 1 of 3 answers have no branch within limits: skipped\n"
-    assert [line["robot"] for line in piped(answers, "pulses", "--json").lines] == ["three_dof"] * 2
-    none = piped(run("ik", THREE_DOF, 9000, 0, 0, "--json"), "fk")
+    assert [line["robot"] for line in run_piped(answers, "pulses", "--json").lines] == ["three_dof"] * 2
+    none = run_piped(run("ik", THREE_DOF, 9000, 0, 0, "--json"), "fk")
     assert (none.code, none.out) == (3, "")
 
 
@@ -60,15 +60,15 @@ def test_what_is_no_answer_is_refused(words: tuple[str, ...], stdin: bytes, code
 def test_csv_of_ik_goes_into_fk_and_pulses() -> None:
     solved = run("ik", THREE_DOF, "--batch", "-", stdin=TARGETS)
     assert solved.code == 3
-    completed = piped(solved, "fk", THREE_DOF, "--batch", "-", "--json")
+    completed = run_piped(solved, "fk", THREE_DOF, "--batch", "-", "--json")
     assert [line["position_mm"] for line in completed.lines] == [
         pytest.approx([390, 80, 300]),
         pytest.approx([0, 400, 200]),
     ]
     assert completed.err == "warning: 1 row without q1,q2,q3 skipped\n"
-    back = piped(piped(solved, "fk", THREE_DOF, "--batch", "-"), "ik", THREE_DOF, "--batch", "-", "--json")
+    back = run_piped(run_piped(solved, "fk", THREE_DOF, "--batch", "-"), "ik", THREE_DOF, "--batch", "-", "--json")
     assert [line["target"] for line in back.lines] == [pytest.approx([390, 80, 300]), pytest.approx([0, 400, 200])]
-    assert piped(solved, "pulses", THREE_DOF, "--batch", "-").code == 0
+    assert run_piped(solved, "pulses", THREE_DOF, "--batch", "-").code == 0
 
 
 def test_a_branch_is_one_column_for_cut() -> None:
@@ -87,10 +87,10 @@ def test_a_trace_goes_into_fk_and_ik() -> None:
     assert "dry run" in trace.err
     table = list(csv.DictReader(io.StringIO(trace.out)))
     tips = [[float(row[f"tool_{axis}_mm"]) for axis in "xyz"] for row in table]
-    poses = piped(trace, "fk", THREE_DOF, "--batch", "-", "--json").lines
+    poses = run_piped(trace, "fk", THREE_DOF, "--batch", "-", "--json").lines
     assert len(poses) == len(table) > 100
     assert [pose["position_mm"] for pose in poses] == [pytest.approx(point, abs=1e-9) for point in tips]
-    targets = piped(trace, "ik", THREE_DOF, "--batch", "-", "--json").lines
+    targets = run_piped(trace, "ik", THREE_DOF, "--batch", "-", "--json").lines
     assert [answer["target"] for answer in targets] == tips
 
 

@@ -27,13 +27,13 @@ def test_every_shipped_robot_is_listed_with_what_it_can_do() -> None:
 
 
 @cache
-def listed() -> dict[str, Any]:
+def listed_robots() -> dict[str, Any]:
     return {entry["robot_file"]: entry for entry in run("robots", "--json").json["robots"]}
 
 
 @pytest.mark.parametrize("name", catalogue.robot_names())
 def test_what_a_robot_can_do_is_what_the_commands_do(name: str) -> None:
-    entry = listed()[name]
+    entry = listed_robots()[name]
     can = entry["can"]
     target = run("fk", name, "home", "--json").json["position_mm"] + [0] * 3
     assert (run("ik", name, *target[: len(entry["target_labels"])]).code in (0, 3)) == can["ik"] or name == "moveo"

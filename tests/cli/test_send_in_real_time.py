@@ -31,14 +31,14 @@ def board() -> Iterator[PtyBoard]:
         yield board
 
 
-def started(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]:
+def start_command(*words: object, stdin: int | None = None) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "armkin", *map(str, words)]
     return subprocess.Popen(command, cwd=ROOT, stdin=stdin, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def moving(board: PtyBoard, speed: int = 10) -> subprocess.Popen[bytes]:
+def start_moving(board: PtyBoard, speed: int = 10) -> subprocess.Popen[bytes]:
     """A send that is well under way, and takes 14 s: on a busy machine, too, it is disturbed before its end."""
-    sender = started("send", THREE_DOF, *POSE, "--port", board.port, "--speed", speed, "--assume-home")
+    sender = start_command("send", THREE_DOF, *POSE, "--port", board.port, "--speed", speed, "--assume-home")
     board.until(lambda: board.net[1] < -400, "under way")
     return sender
 
@@ -57,7 +57,7 @@ def on_the_line(net: Sequence[int]) -> None:
         assert abs(count - share * end) <= 2
 
 
-def finish(board: PtyBoard) -> None:
+def finish_motion(board: PtyBoard) -> None:
     """The next command plans from where the arm stands."""
     completed = run_patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json", run=run_process)
     assert completed.code == 0, completed.err
@@ -77,7 +77,7 @@ def test_lost_then_assumed_then_known(board: PtyBoard) -> None:
     assert again.code == 5
     assert "position is known" in again.err
     # From where it stands, and near to it: the other branch would be nearer to home.
-    finish(board)
+    finish_motion(board)
     status = run_process("status", THREE_DOF, "--port", board.port, "--json").json
     assert (status["position"], status["pulses"], status["drivers_on"]) == ("known", COUNTS, True)
 
@@ -94,7 +94,7 @@ def test_a_changed_file_means_a_lost_position(board: PtyBoard, tmp_path: Path) -
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, code: int) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     sender.send_signal(number)
     output, err = sender.communicate(timeout=60)
     assert sender.returncode == code, err
@@ -102,11 +102,11 @@ def test_a_signal_stops_the_arm_first(board: PtyBoard, number: signal.Signals, c
     assert b"stopped: the arm stands at" in err
     assert board.state == State.IDLE
     on_the_path(board.net)
-    finish(board)
+    finish_motion(board)
 
 
 def test_a_killed_sender(board: PtyBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     sender.kill()
     sender.communicate()
     board.wait(State.IDLE)
@@ -114,11 +114,11 @@ def test_a_killed_sender(board: PtyBoard) -> None:
     on_the_path(net)
     time.sleep(0.5)
     assert board.net == net
-    finish(board)
+    finish_motion(board)
 
 
 def test_a_cut_line(board: PtyBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     board.cut = True
     board.wait(State.IDLE)
     net = board.net
@@ -128,11 +128,11 @@ def test_a_cut_line(board: PtyBoard) -> None:
     assert sender.returncode == 5, err
     assert b"the arm stands at" in err or b"does not answer any more" in err
     assert board.net == net
-    finish(board)
+    finish_motion(board)
 
 
 def test_stop_from_another_terminal(board: PtyBoard) -> None:
-    sender = moving(board, speed=5)
+    sender = start_moving(board, speed=5)
     busy = run_process("send", THREE_DOF, *POSE, "--port", board.port)
     assert busy.code == 5
     assert f"process {sender.pid}" in busy.err
@@ -142,14 +142,14 @@ def test_stop_from_another_terminal(board: PtyBoard) -> None:
     assert sender.returncode == 143, err
     assert board.state == State.IDLE
     assert "the arm stands" in stop.err  # the board itself was asked
-    finish(board)
+    finish_motion(board)
 
 
 def test_stop_beside_a_suspended_sender() -> None:
     seconds: list[float] = []
     while not seconds or (min(seconds) > 6 and len(seconds) < 5):  # a busy computer may be slow, once
         with PtyBoard() as board:
-            sender = moving(board, speed=5)
+            sender = start_moving(board, speed=5)
             board.time.patience = math.inf  # the board, too, notices
             sender.send_signal(signal.SIGSTOP)
             began = time.monotonic()
@@ -163,19 +163,19 @@ def test_stop_beside_a_suspended_sender() -> None:
                 continue
             assert sender.returncode == 143, err
             board.time.patience = 0.12
-            finish(board)
+            finish_motion(board)
     assert min(seconds) < 6
 
 
 def test_stop_without_a_sender(board: PtyBoard) -> None:
     assert run_process("send", THREE_DOF, 10, 80, -80, "--port", board.port, "--assume-home").code == 0
     assert run_process("stop", "--port", board.port).code == 0
-    finish(board)
+    finish_motion(board)
 
 
 def test_rows_that_trickle_in(board: PtyBoard) -> None:
     words = ("send", THREE_DOF, "--batch", "-", "--port", board.port, "--assume-home", "--json")
-    sender = started(*words, stdin=subprocess.PIPE)
+    sender = start_command(*words, stdin=subprocess.PIPE)
     assert sender.stdin is not None
     sender.stdin.write(b"1,89,-89\n")
     sender.stdin.flush()

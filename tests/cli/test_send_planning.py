@@ -42,7 +42,7 @@ def test_a_trace_is_the_path_as_csv(tmp_path: Path) -> None:
     assert float(rows[0]["q1_z_mm"]) == 170
 
 
-def _movable() -> list[Path]:
+def _movable_robots() -> list[Path]:
     """Shipped and test robots with drives and rates, whatever their board."""
     robots = []
     for path in sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests" / "robots").glob("*.yaml")):
@@ -52,7 +52,7 @@ def _movable() -> list[Path]:
     return robots
 
 
-@pytest.mark.parametrize("path", _movable(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", _movable_robots(), ids=lambda path: path.stem)
 def test_every_robot_with_drives_is_rehearsed_or_told_all_that_is_missing(path: Path) -> None:
     import armkin
     from armkin.board.backend.missing_keys import missing_for_motion

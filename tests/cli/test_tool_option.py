@@ -22,7 +22,7 @@ def other(tmp_path: Path) -> Path:
     return path
 
 
-def _bare(answer: dict[str, Any]) -> dict[str, Any]:
+def _without_tool_keys(answer: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in answer.items() if key not in MADE_WITH}
 
 
@@ -44,7 +44,7 @@ def test_answers_are_those_of_a_file_with_that_tool(words: tuple[str, ...], othe
     assert completed.code == want.code == 0, completed.err + want.err
     assert completed.json["tool"] == TOOL
     assert "tool" not in want.json
-    assert _bare(completed.json) == _bare(want.json)
+    assert _without_tool_keys(completed.json) == _without_tool_keys(want.json)
 
 
 def test_three_numbers_turn_nothing() -> None:

@@ -32,7 +32,7 @@ def calibration(tmp_path: Path) -> Path:
     return path
 
 
-def changed(path: Path, name: str, **values: Any) -> None:
+def write_changed(path: Path, name: str, **values: Any) -> None:
     """The calibration file with other values of a motor; None: without that key."""
     answer = json.loads(path.read_text())
     answer[name] = {key: value for key, value in (answer[name] | values).items() if value is not None}
@@ -110,7 +110,7 @@ def test_a_zero_far_from_the_middle_of_its_limits_wants_the_pose(calibration: Pa
 def test_a_file_that_does_not_fit_is_refused_with_the_joint(
     calibration: Path, tmp_path: Path, name: str, values: dict[str, Any], code: int, says: str
 ) -> None:
-    changed(calibration, name, **values)
+    write_changed(calibration, name, **values)
     completed = run("zero", "so101", "--from", calibration, "-o", tmp_path / "mine.yaml")
     assert (completed.code, completed.out) == (code, "")
     assert says in completed.err
@@ -118,8 +118,8 @@ def test_a_file_that_does_not_fit_is_refused_with_the_joint(
 
 
 def test_two_motors_that_have_changed_places_are_refused(calibration: Path) -> None:
-    changed(calibration, "elbow_flex", id=4)
-    changed(calibration, "wrist_flex", id=3)
+    write_changed(calibration, "elbow_flex", id=4)
+    write_changed(calibration, "wrist_flex", id=3)
     completed = run("zero", "so101", "--from", calibration)
     assert (completed.code, "joint elbow_flex is servo 3, which is wrist_flex in the file" in completed.err) == (
         2,

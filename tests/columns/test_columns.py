@@ -106,7 +106,7 @@ def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return path
 
 
-def ik(source: Path, out: Path, *more: object) -> Result:
+def run_ik(source: Path, out: Path, *more: object) -> Result:
     return run("ik", THREE_DOF, "--batch", source, "--out", out, *more)
 
 
@@ -127,7 +127,7 @@ def test_columns_are_what_objects_say(rows: Path, more: list[str]) -> None:
 
 def test_every_format_holds_the_same_and_is_read_again(rows: Path, tmp_path: Path) -> None:
     outs = {end: tmp_path / f"out.{end}" for end in ("csv", "npz", "parquet", "jsonl")}
-    assert {ik(rows, out).code for out in outs.values()} == {3}
+    assert {run_ik(rows, out).code for out in outs.values()} == {3}
     csv = [line.split(",") for line in outs["csv"].read_text().splitlines()]
     npz = np.load(outs["npz"])
     parquet = pyarrow.parquet.read_table(outs["parquet"])
@@ -148,13 +148,13 @@ def test_every_format_holds_the_same_and_is_read_again(rows: Path, tmp_path: Pat
 
 def test_json_is_no_archive(rows: Path, tmp_path: Path) -> None:
     for end in ("npz", "parquet"):
-        assert ik(rows, tmp_path / f"out.{end}", "--json").code == 2
+        assert run_ik(rows, tmp_path / f"out.{end}", "--json").code == 2
 
 
 @pytest.mark.parametrize("end", ["csv", "npz", "parquet"])
 def test_processes_change_no_byte(rows: Path, tmp_path: Path, end: str) -> None:
     alone, two = tmp_path / f"one.{end}", tmp_path / f"two.{end}"
-    assert ik(rows, alone) == ik(rows, two, "--workers", 2)
+    assert run_ik(rows, alone) == run_ik(rows, two, "--workers", 2)
     assert alone.read_bytes() == two.read_bytes()
 
 
@@ -162,7 +162,7 @@ def test_processes_without_rows_leave_nothing(tmp_path: Path) -> None:
     nothing = tmp_path / "nothing.csv"
     nothing.write_text("x,y,z\n")
     for name in (nothing, tmp_path / "missing.csv"):
-        assert ik(name, tmp_path / "out.csv", "--workers", 2).code in (1, 2)
+        assert run_ik(name, tmp_path / "out.csv", "--workers", 2).code in (1, 2)
     assert [path.name for path in tmp_path.iterdir()] == ["nothing.csv"]
 
 
@@ -187,18 +187,18 @@ def test_a_run_goes_on_where_it_was_ended(
     rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, end: str, more: list[str]
 ) -> None:
     undisturbed, target = tmp_path / f"whole.{end}", tmp_path / f"out.{end}"
-    completed = ik(rows, undisturbed, *more)
+    completed = run_ik(rows, undisturbed, *more)
     with monkeypatch.context() as patch:
         stop_after(4, patch, KeyboardInterrupt())
-        assert ik(rows, target, *more).code == 130
+        assert run_ik(rows, target, *more).code == 130
     folder = tmp_path / f"out.{end}.parts"
     assert sorted(path.name for path in folder.iterdir() if path.name[0] == "0") == [f"{i:08d}" for i in range(4)]
     (folder / "00000004.writing").write_bytes(b"half")
-    refused = ik(rows, target, *more)
+    refused = run_ik(rows, target, *more)
     assert refused.code == 1
     assert f"out.{end}.parts holds what an earlier run has finished" in refused.err
     answered = stop_after(99, monkeypatch, KeyboardInterrupt())
-    assert ik(rows, target, *more, "--resume") == completed
+    assert run_ik(rows, target, *more, "--resume") == completed
     assert answered == [4, 5, 6, 7, 8, 9]
     assert target.read_bytes() == undisturbed.read_bytes()
     assert not folder.exists()
@@ -208,18 +208,18 @@ def test_another_job_is_refused_and_loses_nothing(rows: Path, tmp_path: Path, mo
     out = tmp_path / "out.csv"
     with monkeypatch.context() as patch:
         stop_after(4, patch, KeyboardInterrupt())
-        ik(rows, out)
+        run_ik(rows, out)
     before = rows.read_bytes()
     for more, word in ((["--all-branches"], "all_branches"), (["--near", "1,2,3"], "near")):
-        refused = ik(rows, out, *more, "--resume")
+        refused = run_ik(rows, out, *more, "--resume")
         assert refused.code == 2
         assert f"belongs to another job: {word} differs" in refused.err
     rows.write_bytes(before + b"1,2,3\n")
-    assert "input size differs" in ik(rows, out, "--resume").err
+    assert "input size differs" in run_ik(rows, out, "--resume").err
     rows.write_bytes(before.replace(b"x,y,z", b"x,Y,z"))  # as long, in the first piece
-    assert "the input has changed" in ik(rows, out, "--resume").err
+    assert "the input has changed" in run_ik(rows, out, "--resume").err
     rows.write_bytes(before)
-    assert ik(rows, out, "--resume").code == 3
+    assert run_ik(rows, out, "--resume").code == 3
 
 
 def test_a_changed_robot_is_refused_and_loses_nothing(
@@ -243,20 +243,20 @@ def test_two_runs_do_not_share_a_folder(rows: Path, tmp_path: Path, monkeypatch:
     out = tmp_path / "out.csv"
     with monkeypatch.context() as patch:
         stop_after(4, patch, KeyboardInterrupt())
-        ik(rows, out)
+        run_ik(rows, out)
     job = json.loads((tmp_path / "out.csv.parts" / "job.json").read_text())
     second_run = finished_chunks.Parts(str(out), job)
     second_run.begin()
-    assert "another run works on it" in ik(rows, out, "--resume").err
+    assert "another run works on it" in run_ik(rows, out, "--resume").err
     second_run.leave()
-    assert ik(rows, out, "--resume").code == 3
+    assert run_ik(rows, out, "--resume").code == 3
 
 
 def test_a_full_disk_stops_and_the_run_goes_on_later(
     rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     undisturbed, out = tmp_path / "whole.csv", tmp_path / "out.csv"
-    ik(rows, undisturbed)
+    run_ik(rows, undisturbed)
     flush = os.fsync
     calls: list[int] = []
 
@@ -268,11 +268,11 @@ def test_a_full_disk_stops_and_the_run_goes_on_later(
 
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)
-        stopped = ik(rows, out)
+        stopped = run_ik(rows, out)
     assert stopped.code == 1
     assert "the disk is full; what is finished stays in" in stopped.err
     assert "--resume" in stopped.err
-    assert ik(rows, out, "--resume").code == 3
+    assert run_ik(rows, out, "--resume").code == 3
     assert out.read_bytes() == undisturbed.read_bytes()
 
 

@@ -28,7 +28,7 @@ CLOSED = ["three_dof", "puma560", "ur5e", "labvolt_5150", "cobra600", "stanford"
 ELIMINATED = ["jaco_j2n6s300", "moveo"]
 
 
-def same(a: armkin.Solutions, b: armkin.Solutions) -> None:
+def assert_same(a: armkin.Solutions, b: armkin.Solutions) -> None:
     """Two answers to the same question: alike but for the rounding of joint values."""
     for name in ("valid", "within_limits", "branch", "status", "free", "complete", "near"):
         left, right = getattr(a, name), getattr(b, name)
@@ -43,7 +43,7 @@ def same(a: armkin.Solutions, b: armkin.Solutions) -> None:
 def found_by_elimination(a: armkin.Solutions, b: armkin.Solutions) -> None:
     """The same, but that rounding may decide in which pass a pose is settled, and so whether it is `complete`."""
     assert (a.complete & ~b.complete).mean() <= 0.01
-    same(a, replace(b, complete=a.complete))
+    assert_same(a, replace(b, complete=a.complete))
 
 
 @pytest.mark.parametrize("robot", ELIMINATED)
@@ -51,9 +51,9 @@ def test_the_elimination_says_what_python_says(robot: str) -> None:
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
     fast = armkin.compile(arm)
     for kind, count in (("random", 200), ("corners", 8), ("far", 50), ("float32", 4)):
-        target = questions(arm, kind, count)
+        target = target_set(arm, kind, count)
         found_by_elimination(armkin.ik(arm, target), fast.ik(target))
-    target = questions(arm, "random", 30)
+    target = target_set(arm, "random", 30)
     near = np.random.default_rng(5).uniform(-6, 6, (30, arm.n))
     for k in range(4):
         found_by_elimination(armkin.ik(arm, target[k], near=near[k]), fast.ik(target[k], near=near[k]))
@@ -69,7 +69,7 @@ def test_the_elimination_says_what_python_says(robot: str) -> None:
     found_by_elimination(armkin.ik(arm, far), fast.ik(far))
 
 
-def questions(arm: armkin.Arm, kind: str, count: int) -> np.ndarray:
+def target_set(arm: armkin.Arm, kind: str, count: int) -> np.ndarray:
     """Targets of random postures, of multiples of 45 degrees, out of reach, or rounded."""
     rng = np.random.default_rng(4)
     unit = np.where(arm.prismatic, arm.reach / 8, np.pi)
@@ -91,44 +91,44 @@ def questions(arm: armkin.Arm, kind: str, count: int) -> np.ndarray:
 @pytest.mark.parametrize("robot", CLOSED)
 def test_it_says_what_python_says(robot: str, kind: str) -> None:
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
-    target = questions(arm, kind, 200 if kind == "corners" else 1000)
-    same(armkin.ik(arm, target), armkin.compile(arm).ik(target))
+    target = target_set(arm, kind, 200 if kind == "corners" else 1000)
+    assert_same(armkin.ik(arm, target), armkin.compile(arm).ik(target))
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "puma560", "three_dof"])
 def test_joints_half_a_turn_from_near_say_what_python_says(robot: str) -> None:
     """Limits of a turn either way, of half a turn, and others; one `near` of zeros, another one, and one a target."""
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
-    fast, target = armkin.compile(arm), questions(arm, "corners", 200)
+    fast, target = armkin.compile(arm), target_set(arm, "corners", 200)
     near_of_each = np.pi / 4 * np.random.default_rng(5).integers(-4, 5, (200, arm.n))
     for near in (np.zeros(arm.n), np.full(arm.n, -np.pi / 2), near_of_each):
         solutions = armkin.ik(arm, target, near=near)
-        same(solutions, fast.ik(target, near=near))
+        assert_same(solutions, fast.ik(target, near=near))
         assert (np.abs(np.abs(solutions.q - solutions.near[:, None]) - np.pi) < 1e-9).any()
         alone = near if near.ndim == 1 else near[7]
-        same(armkin.ik(arm, target[7], near=alone), fast.ik(target[7], near=alone))
+        assert_same(armkin.ik(arm, target[7], near=alone), fast.ik(target[7], near=alone))
 
 
 @pytest.mark.parametrize("robot", ["three_dof", "puma560", "labvolt_5150", "cobra600"])
 def test_one_target_and_its_shapes(robot: str) -> None:
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
     fast = armkin.compile(arm)
-    target = questions(arm, "random", 4)
+    target = target_set(arm, "random", 4)
     for shaped in (target[0], target[0].tolist(), target.reshape(2, 2, *target.shape[1:]), target[:0]):
-        same(armkin.ik(arm, shaped), fast.ik(shaped))
-    same(armkin.ik(arm, target[1], near=arm.home + 3), fast.ik(target[1], near=arm.home + 3))
+        assert_same(armkin.ik(arm, shaped), fast.ik(shaped))
+    assert_same(armkin.ik(arm, target[1], near=arm.home + 3), fast.ik(target[1], near=arm.home + 3))
 
 
 @pytest.mark.parametrize("robot", ["ur5e", "puma560", "three_dof"])
 def test_near_decides_the_copies(robot: str) -> None:
     arm = armkin.load(ROBOTS / f"{robot}.yaml")
     fast = armkin.compile(arm)
-    target = questions(arm, "random", 300)
+    target = target_set(arm, "random", 300)
     near = np.random.default_rng(5).uniform(-6, 6, (300, arm.n))
-    same(armkin.ik(arm, target, near=near[0]), fast.ik(target, near=near[0]))
+    assert_same(armkin.ik(arm, target, near=near[0]), fast.ik(target, near=near[0]))
     solutions = fast.ik(target, near=near)
     for k in range(40):
-        same(armkin.ik(arm, target[k], near=near[k]), fast.ik(target[k], near=near[k]))
+        assert_same(armkin.ik(arm, target[k], near=near[k]), fast.ik(target[k], near=near[k]))
         np.testing.assert_array_equal(solutions.q[k], fast.ik(target[k : k + 1], near=near[k : k + 1]).q[0])
 
 
@@ -163,10 +163,10 @@ def test_what_is_no_target_is_refused_in_the_same_words() -> None:
 def test_workers_change_nothing() -> None:
     arm = armkin.load(ROBOTS / "ur5e.yaml")
     fast = armkin.compile(arm)
-    target = questions(arm, "random", 20_000)
+    target = target_set(arm, "random", 20_000)
     alone, two = fast.ik(target), fast.ik(target, workers=2)
     np.testing.assert_array_equal(alone.q, two.q)
-    same(alone, two)
+    assert_same(alone, two)
     q = np.nan_to_num(alone.q[:, 0])
     np.testing.assert_array_equal(fast.fk(q), fast.fk(q, workers=3))
     with pytest.raises(armkin.UsageError, match="workers"):
@@ -273,7 +273,7 @@ def test_a_posture_on_its_limit_stays() -> None:
     fast = armkin.compile(arm)
     for target in (T, np.stack([T] * 3)):
         solutions = fast.ik(target, near=q)
-        same(solutions, armkin.ik(arm, target, near=q))
+        assert_same(solutions, armkin.ik(arm, target, near=q))
         assert np.abs(solutions.q.reshape(-1, 8, 6)[0, np.ravel(solutions.best)[0]] - q).max() < 1e-12
 
 
@@ -305,7 +305,7 @@ def test_results_keep_their_own_targets(robot: str) -> None:
     """A loop that writes the next targets into the same array changes nothing that has been answered."""
     arm = armkin.load(robot)
     fast = armkin.compile(arm)
-    target, near = questions(arm, "random", 3), np.random.default_rng(2).uniform(-1, 1, (3, arm.n))
+    target, near = target_set(arm, "random", 3), np.random.default_rng(2).uniform(-1, 1, (3, arm.n))
     for goal, close in ((target, near), (target[0], near[0]), (target, near[0])):
         own_target, beside = goal.copy(), close.copy()
         solutions = fast.ik(own_target, near=beside)
@@ -352,7 +352,7 @@ def test_roots_that_solutions_share_are_taken_apart_in_c(
 def test_an_arm_off_its_class_is_solved_in_c_and_named_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
     """A calibrated UR5e: all of its targets were solved in Python, 0.2 ms each."""
     arm = arm_of_file(parse_robot_file((ROBOTS / "ur5e.yaml").read_text().replace("alpha: 0,", "alpha: 0.01,", 1)))
-    target = questions(arm, "random", 60)
+    target = target_set(arm, "random", 60)
     python, single = armkin.ik(arm, target), armkin.ik(arm, target[0])
     left = left_to_python(monkeypatch)
     solutions = armkin.compile(arm).ik(target)

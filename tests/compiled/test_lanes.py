@@ -55,7 +55,7 @@ int in_lanes(const double *a, int n, double *re, double *im)
 """
 
 
-def built() -> ctypes.CDLL:
+def build_library() -> ctypes.CDLL:
     """The two ways, without an arm."""
     head = (PARTS / "head.c").read_text().partition("typedef double arm_real")[0].replace("/* @about@ */", "")
     lanes = "".join((PARTS / f"{name}.c").read_text() for name in ("lanes", "lanes_eigenvalues"))
@@ -63,7 +63,7 @@ def built() -> ctypes.CDLL:
     return toolchain.load_library(text, "lanes", 2)
 
 
-def matrices(n: int, count: int) -> np.ndarray:
+def companion_matrices(n: int, count: int) -> np.ndarray:
     """Companion forms of quadratic pencils, badly scaled ones, and some with roots twice or at zero."""
     rng = np.random.default_rng([n, count])
     a = rng.standard_normal((count, n, n))
@@ -75,10 +75,10 @@ def matrices(n: int, count: int) -> np.ndarray:
 
 
 def test_real_roots_are_as_many_in_lanes() -> None:
-    library = built()
+    library = build_library()
     lanes = library.lanes()
     for n in (16, 20, 24):
-        companions = matrices(n, 4096 if n == 16 else 512)
+        companions = companion_matrices(n, 4096 if n == 16 else 512)
         for group in companions.reshape(-1, lanes, n, n):
             re, im = np.empty((2, lanes, n))
             assert not library.in_lanes(np.ascontiguousarray(group).ctypes, n, re.ctypes, im.ctypes)

@@ -11,7 +11,7 @@ import armkin
 from armkin.compiled import compiled_arm, toolchain
 
 
-def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def watch_loading(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """What libraries hold as `arm_content` from now on, one by one; no arm has any yet."""
     contents: list[str] = []
     load = toolchain.load_library
@@ -28,7 +28,7 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 @pytest.mark.usefixtures("quickly")
 def test_a_task_by_name_is_built_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """The arm's usual task, and that of the arm whose last joint is held, were built, too."""
-    arm, contents = armkin.load("ur5e"), loaded(monkeypatch)
+    arm, contents = armkin.load("ur5e"), watch_loading(monkeypatch)
     fast = armkin.compile(arm, "xyz_axis")
     T = armkin.fk(arm, arm.home)
     np.testing.assert_allclose(fast.fk(arm.home), T, atol=1e-9)
@@ -38,7 +38,7 @@ def test_a_task_by_name_is_built_alone(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_usual_task_by_its_name_is_the_usual_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    arm, contents = armkin.load("three_dof"), loaded(monkeypatch)
+    arm, contents = armkin.load("three_dof"), watch_loading(monkeypatch)
     for task in ("xyz", None, "xyz"):
         assert armkin.compile(arm, task).ik([390, 80, 300], task).valid.sum() == 4
     assert len(contents) == 1

@@ -24,13 +24,13 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache" / "armkin" / "compiled"
 
 
-def answer(*words: str) -> subprocess.CompletedProcess[str]:
+def answer_of_process(*words: str) -> subprocess.CompletedProcess[str]:
     """What a process of its own finds: a library that is torn may end it."""
     code = f"from armkin.compiled.toolchain import load_library; print(load_library({SOURCE!r}, 'abc').answer())"
     return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=False)
 
 
-def put(library: Path, held: bytes, mode: int = 0o700) -> None:
+def replace_library(library: Path, held: bytes, mode: int = 0o700) -> None:
     """Another file of that name: one that this process has loaded must not lose its pages, which its end still runs."""
     draft = library.with_suffix(".new")
     draft.write_bytes(held)
@@ -44,8 +44,8 @@ def test_a_torn_library_is_built_again(cache: Path, size: int) -> None:
     toolchain.load_library(SOURCE, "abc")
     [library] = cache.glob("*.so")
     assert library.stat().st_size > size
-    put(library, library.read_bytes()[:size])
-    completed = answer()
+    replace_library(library, library.read_bytes()[:size])
+    completed = answer_of_process()
     assert (completed.returncode, completed.stdout) == (0, "42\n")
 
 
@@ -54,8 +54,8 @@ def test_a_library_with_a_byte_changed_is_built_again(cache: Path) -> None:
     [library] = cache.glob("*.so")
     held = library.read_bytes()
     place = held.index((42).to_bytes(4, "little"))
-    put(library, held[:place] + b"\x2b" + held[place + 1 :])
-    assert answer().stdout == "42\n"
+    replace_library(library, held[:place] + b"\x2b" + held[place + 1 :])
+    assert answer_of_process().stdout == "42\n"
     assert [path.read_bytes() for path in cache.glob("*.so")] == [held]
 
 
@@ -67,12 +67,12 @@ def test_a_library_that_others_may_have_written_is_built_again(cache: Path, mode
     toolchain.load_library(SOURCE, "abc")
     [genuine] = set(cache.glob("*.so")) - {false}
     named = genuine.with_name(f"{genuine.stem.partition('-')[0]}-{false.stem.partition('-')[2]}.so")
-    put(named, false.read_bytes())
+    replace_library(named, false.read_bytes())
     genuine.unlink()
     false.unlink()
-    assert answer().stdout == "43\n"  # as it would be believed
+    assert answer_of_process().stdout == "43\n"  # as it would be believed
     named.chmod(mode)
-    assert answer().stdout == "42\n"
+    assert answer_of_process().stdout == "42\n"
 
 
 def test_a_library_of_another_user_is_not_loaded(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -35,9 +35,9 @@ class Cluster:
         folder, workers = self.folder, self.count
         self.file = folder / f"scheduler-{time.monotonic_ns()}.json"
         common = ["--scheduler-file", str(self.file), "--no-dashboard"]
-        self.scheduler = _dask("scheduler", "--host", "127.0.0.1", "--port", "0", *common)
-        self.nanny = _dask("worker", *common, "--nworkers", str(workers), "--nthreads", "1")
-        until(lambda: self.file.exists() and self.file.stat().st_size > 0)
+        self.scheduler = _start_dask("scheduler", "--host", "127.0.0.1", "--port", "0", *common)
+        self.nanny = _start_dask("worker", *common, "--nworkers", str(workers), "--nthreads", "1")
+        wait_until(lambda: self.file.exists() and self.file.stat().st_size > 0)
 
     @property
     def address(self) -> str:
@@ -48,14 +48,14 @@ class Cluster:
 
     def workers(self) -> list[int]:
         """The processes that answer chunks."""
-        return [pid for pid in children(self.nanny.pid) if b"spawn_main" in command_line(pid)]
+        return [pid for pid in all_children(self.nanny.pid) if b"spawn_main" in command_line(pid)]
 
     def close(self) -> None:
         """End all of it."""
         for process in (self.nanny, self.scheduler):
-            pids = [process.pid, *children(process.pid)]
+            pids = [process.pid, *all_children(process.pid)]
             for pid in pids:
-                kill(pid)
+                kill_process(pid)
             process.wait(PATIENCE)
 
 
@@ -70,7 +70,7 @@ class Told(NamedTuple):
     same: bool
 
 
-def rows(path: Path, count: int) -> None:
+def write_rows(path: Path, count: int) -> None:
     """Targets of a UR5e as CSV."""
     rng = np.random.default_rng(3)
     values = np.column_stack([rng.uniform(-500, 500, (count, 3)), rng.uniform(-180, 180, (count, 3))]).round(3)
@@ -79,52 +79,54 @@ def rows(path: Path, count: int) -> None:
         np.savetxt(file, values, fmt="%.3f", delimiter=",")
 
 
-def batch(source: Path, out: Path, *more: str) -> subprocess.Popen[str]:
+def begin_batch(source: Path, out: Path, *more: str) -> subprocess.Popen[str]:
     """The command."""
     words = [sys.executable, "-m", "armkin", "ik", "ur5e", "--batch", str(source), "--out", str(out), *more]
     return subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
 
 
-def digest(path: Path) -> str:
+def file_digest(path: Path) -> str:
     """Of a file's bytes."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
-def disturbed(source: Path, out: Path, expected: str, victim: str, cluster: Cluster, rng: Random, count: int) -> Told:
+def disturb_batch(
+    source: Path, out: Path, expected: str, victim: str, cluster: Cluster, rng: Random, count: int
+) -> Told:
     """A batch of `count` parts during which a worker, the scheduler or the client is killed; then it goes on.
 
     A killed scheduler has another in its place.
     """
-    process = batch(source, out, "--cluster", cluster.address)
+    process = begin_batch(source, out, "--cluster", cluster.address)
     parts = Path(f"{out}.parts")
     least_parts = rng.randrange(count)
-    until(lambda: len(finished(parts)) >= least_parts or process.poll() is not None)
+    wait_until(lambda: len(finished_parts(parts)) >= least_parts or process.poll() is not None)
     time.sleep(rng.uniform(0.0, 0.3))
     killed = process.poll() is None
     if victim == "worker":
-        until(lambda: bool(cluster.workers()) or process.poll() is not None)
+        wait_until(lambda: bool(cluster.workers()) or process.poll() is not None)
         for pid in cluster.workers()[:1]:
-            kill(pid)
+            kill_process(pid)
     else:
-        kill(process.pid if victim == "client" else cluster.scheduler.pid)
+        kill_process(process.pid if victim == "client" else cluster.scheduler.pid)
     _, err = process.communicate(timeout=PATIENCE)
-    before = finished(parts)
+    before = finished_parts(parts)
     if victim == "scheduler":
         cluster.start_again()
     if process.returncode in (0, 3):
-        return Told(process.returncode, err, killed, len(before), 0, digest(out) == expected)
-    again = batch(source, out, "--cluster", cluster.address, "--resume")
+        return Told(process.returncode, err, killed, len(before), 0, file_digest(out) == expected)
+    again = begin_batch(source, out, "--cluster", cluster.address, "--resume")
     redone: set[str] = set()
     while again.poll() is None:  # a part that is written anew is another file
-        parts_now = finished(parts)
+        parts_now = finished_parts(parts)
         redone |= {name for name, file in before.items() if name in parts_now and parts_now[name] != file}
         time.sleep(0.02)
     again.communicate(timeout=PATIENCE)
-    good = again.returncode in (0, 3) and digest(out) == expected and not parts.exists()
+    good = again.returncode in (0, 3) and file_digest(out) == expected and not parts.exists()
     return Told(process.returncode, err, killed, len(before), len(redone), good)
 
 
-def finished(parts: Path) -> dict[str, int]:
+def finished_parts(parts: Path) -> dict[str, int]:
     """The parts that are there, and which file each is."""
     inode_of = {}
     for path in parts.glob("[0-9]*[0-9]"):
@@ -135,7 +137,7 @@ def finished(parts: Path) -> dict[str, int]:
     return inode_of
 
 
-def until(ready: Any) -> None:
+def wait_until(ready: Any) -> None:
     """Wait for something."""
     end = time.monotonic() + PATIENCE
     while not ready():
@@ -143,7 +145,7 @@ def until(ready: Any) -> None:
         time.sleep(0.01)
 
 
-def kill(pid: int) -> None:
+def kill_process(pid: int) -> None:
     """SIGKILL, to a process that may have ended."""
     try:
         os.kill(pid, signal.SIGKILL)
@@ -151,13 +153,13 @@ def kill(pid: int) -> None:
         return
 
 
-def children(pid: int) -> list[int]:
+def all_children(pid: int) -> list[int]:
     """All processes below one."""
     try:
         direct = [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
     except OSError:
         return []
-    return [descendant for child in direct for descendant in (child, *children(child))]
+    return [descendant for child in direct for descendant in (child, *all_children(child))]
 
 
 def command_line(pid: int) -> bytes:
@@ -168,6 +170,6 @@ def command_line(pid: int) -> bytes:
         return b""
 
 
-def _dask(*words: str) -> subprocess.Popen[bytes]:
+def _start_dask(*words: str) -> subprocess.Popen[bytes]:
     command: Sequence[str] = [sys.executable, "-m", "dask", *words]
     return subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

@@ -24,7 +24,7 @@ from armkin.engines import dask_cluster
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ClusterError
 from command_line import ROOT, THREE_DOF, run
-from killed_once import square
+from killed_once import square_or_die
 
 
 @pytest.fixture(scope="module")
@@ -47,16 +47,16 @@ def address(whole: kills.Cluster) -> str:
 def test_a_killed_worker_loses_its_chunk_alone(address: str, engine_kind: str, tmp_path: Path) -> None:
     engine = Engine(cluster=address) if engine_kind == "cluster" else Engine(workers=2)
     mark = tmp_path / "killed"
-    assert list(in_order(engine, square, str(mark), range(8))) == [i * i for i in range(8)]
+    assert list(in_order(engine, square_or_die, str(mark), range(8))) == [i * i for i in range(8)]
     assert mark.exists()
 
 
 _POOL = """
 import os, sys
 from armkin.engines.ordered_chunks import Engine, in_order
-from killed_once import waiting
+from killed_once import wait_for_ever
 if __name__ == "__main__":
-    for found in in_order(Engine(workers=2), waiting, "", range(9)):
+    for found in in_order(Engine(workers=2), wait_for_ever, "", range(9)):
         print(found, flush=True)
 """
 
@@ -119,9 +119,9 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A batch's input, and the digest of its answers."""
     folder = tmp_path_factory.mktemp("undisturbed")
     source, target = folder / "in.csv", folder / "one.csv"
-    kills.rows(source, 60_000)
-    kills.batch(source, target).communicate(timeout=kills.PATIENCE)
-    return source, kills.digest(target)
+    kills.write_rows(source, 60_000)
+    kills.begin_batch(source, target).communicate(timeout=kills.PATIENCE)
+    return source, kills.file_digest(target)
 
 
 @pytest.mark.parametrize("victim", ["worker", "client", "scheduler"])
@@ -130,7 +130,7 @@ def test_a_kill_costs_at_most_the_chunks_in_hand(
 ) -> None:
     """One of each here; twenty of each: tests/bench/bench_kills.py."""
     source, expected = undisturbed
-    disturbed = kills.disturbed(source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3)
+    disturbed = kills.disturb_batch(source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3)
     assert disturbed.same, disturbed
     assert disturbed.redone == 0
     assert disturbed.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[victim], disturbed
@@ -141,11 +141,11 @@ def test_a_kill_costs_at_most_the_chunks_in_hand(
 def test_no_scheduler_and_another_version_are_told(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(armkin, "__version__", "0.0.9")
     with pytest.raises(ClusterError, match="has armkin "):
-        list(in_order(Engine(cluster=address), square, "", range(3)))
+        list(in_order(Engine(cluster=address), square_or_die, "", range(3)))
     monkeypatch.undo()
     monkeypatch.setattr(dask_cluster, "SECONDS", 0.5)
     with pytest.raises(ClusterError, match="no scheduler answers"):
-        list(in_order(Engine(cluster="tcp://127.0.0.1:9"), square, "", range(3)))
+        list(in_order(Engine(cluster="tcp://127.0.0.1:9"), square_or_die, "", range(3)))
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_an_unreachable_address_is_said_within_three_seconds(place: str, says: s
     import_module("distributed")  # whose time is that of every command with a cluster
     began = time.monotonic()
     with pytest.raises(ClusterError) as caught:
-        list(in_order(Engine(cluster=place), square, "", range(3)))
+        list(in_order(Engine(cluster=place), square_or_die, "", range(3)))
     assert says in str(caught.value)
     assert time.monotonic() - began < 3
 
@@ -171,7 +171,7 @@ def test_an_unreachable_address_is_said_within_three_seconds(place: str, says: s
 def test_a_name_that_nobody_knows_is_no_schedulers() -> None:
     """How long that takes to be known is the network's affair."""
     with pytest.raises(ClusterError, match="no scheduler answers \\("):
-        list(in_order(Engine(cluster="tcp://nowhere.invalid:8786"), square, "", range(3)))
+        list(in_order(Engine(cluster="tcp://nowhere.invalid:8786"), square_or_die, "", range(3)))
 
 
 def test_an_address_that_drops_packets_is_said_within_three_seconds(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -186,19 +186,19 @@ def test_an_address_that_drops_packets_is_said_within_three_seconds(monkeypatch:
         import_module("distributed")
         began = time.monotonic()
         with pytest.raises(ClusterError, match=r"no connection in 1.5 s"):
-            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{deaf.getsockname()[1]}"), square, "", range(3)))
+            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{deaf.getsockname()[1]}"), square_or_die, "", range(3)))
         assert time.monotonic() - began < 3
 
 
 def test_another_program_at_the_address_is_no_scheduler() -> None:
     """A web server's answer, taken for a length, is more than any memory."""
     with socket.create_server(("127.0.0.1", 0)) as web:
-        Thread(target=_web, args=(web,), daemon=True).start()
+        Thread(target=_serve_web, args=(web,), daemon=True).start()
         with pytest.raises(ClusterError, match="no scheduler answers \\(what answers there is no Dask scheduler"):
-            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{web.getsockname()[1]}"), square, "", range(3)))
+            list(in_order(Engine(cluster=f"tcp://127.0.0.1:{web.getsockname()[1]}"), square_or_die, "", range(3)))
 
 
-def _web(server: socket.socket) -> None:
+def _serve_web(server: socket.socket) -> None:
     with suppress(OSError):  # until it is closed
         while True:
             with server.accept()[0] as connection, suppress(OSError):

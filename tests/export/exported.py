@@ -32,7 +32,7 @@ texts_of = cache(program)
 _libraries: dict[tuple[str, ...], ctypes.CDLL] = {}
 
 
-def library(arm: armkin.Arm, folder: Path, level: str = "-O0", *, single: bool = False) -> ctypes.CDLL:
+def build_library(arm: armkin.Arm, folder: Path, level: str = "-O0", *, single: bool = False) -> ctypes.CDLL:
     """The generated source as a shared library; some dozen targets take less time than optimising does."""
     texts = texts_of(arm, "arm.c", None, single)
     key = texts.source, texts.header, level
@@ -50,7 +50,7 @@ class Exported:
 
     def __init__(self, arm: armkin.Arm, folder: Path, single: bool = False) -> None:
         self.arm, self.real = arm, np.dtype(np.float32 if single else np.float64)
-        code, prefix = library(arm, folder, single=single), identifier(arm.name)
+        code, prefix = build_library(arm, folder, single=single), identifier(arm.name)
         number = ctypes.c_float if single else ctypes.c_double
 
         class Solution(ctypes.Structure):
@@ -75,7 +75,7 @@ class Exported:
         return count, bool(self._edge.value), q, best
 
 
-def postures(arm: armkin.Arm, count: int) -> np.ndarray:
+def random_postures(arm: armkin.Arm, count: int) -> np.ndarray:
     """Random joint values: anywhere, a quarter of them within limits."""
     rng = np.random.default_rng(3)
     turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
@@ -86,11 +86,11 @@ def postures(arm: armkin.Arm, count: int) -> np.ndarray:
     )
 
 
-def agreement(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
+def compare_answers(arm: armkin.Arm, folder: Path, count: int) -> Agreement:
     """Compare on random poses."""
-    code, n, prefix = library(arm, folder, "-O1"), arm.n, identifier(arm.name)
+    code, n, prefix = build_library(arm, folder, "-O1"), arm.n, identifier(arm.name)
     task, _ = solver(arm, None)
-    q = postures(arm, count)
+    q = random_postures(arm, count)
     T = armkin.fk(arm, q)
     target = targets_of(task, T, q)
     solutions = armkin.ik(arm, target)

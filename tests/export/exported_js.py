@@ -38,7 +38,7 @@ writeFileSync('told.json', JSON.stringify(told));
 """
 
 
-def ask(
+def ask_module(
     arm: armkin.Arm,
     folder: Path,
     q: np.ndarray,
@@ -68,10 +68,10 @@ def goals_of(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
 
 def differences(arm: armkin.Arm, answers: list[dict[str, Any]], s: armkin.Solutions) -> list[str]:
     """What differs between the module's answers and Python's (N,): a line for each target that is not the same."""
-    return [line for k, answer in enumerate(answers) if (line := _differs(arm, answer, s, k))]
+    return [line for k, answer in enumerate(answers) if (line := _difference(arm, answer, s, k))]
 
 
-def _differs(arm: armkin.Arm, answer: dict[str, Any], s: armkin.Solutions, k: int) -> str:
+def _difference(arm: armkin.Arm, answer: dict[str, Any], s: armkin.Solutions, k: int) -> str:
     status = armkin.Status(s.status[k]).name.lower()
     if answer["status"] != status:
         return f"target {k}: {answer['status']}, Python {status}"

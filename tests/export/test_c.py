@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import Exported, agreement, postures, texts_of
+from exported import Exported, compare_answers, random_postures, texts_of
 
 import armkin
 import right_angles
@@ -29,7 +29,7 @@ CLOSED = ["three_dof", "puma560", "ur5e", "labvolt_5150", "cobra600", "stanford"
 GENERAL = ["jaco_j2n6s300", "moveo"]
 
 
-def written(folder: Path, robot: str, single: bool = False) -> Path:
+def write_sources(folder: Path, robot: str, single: bool = False) -> Path:
     """The generated files of a shipped robot; the path of the source."""
     texts = texts_of(armkin.load(ROBOTS / f"{robot}.yaml"), f"{robot}.c", None, single)
     (folder / f"{robot}.c").write_text(texts.source)
@@ -38,7 +38,7 @@ def written(folder: Path, robot: str, single: bool = False) -> Path:
     return folder / f"{robot}.c"
 
 
-def run(*command: str | Path, folder: Path) -> str:
+def run_command(*command: str | Path, folder: Path) -> str:
     completed = subprocess.run([str(word) for word in command], cwd=folder, capture_output=True, text=True, check=False)
     assert completed.returncode == 0, completed.stdout[-2000:] + completed.stderr[-4000:]
     assert not completed.stderr
@@ -47,16 +47,16 @@ def run(*command: str | Path, folder: Path) -> str:
 
 @pytest.mark.parametrize("robot", [*CLOSED, *GENERAL, "panda", "kinova_gen3"])
 def test_the_test_program_passes_under_the_sanitizers(robot: str, tmp_path: Path) -> None:
-    source = written(tmp_path, robot)
-    run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
-    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+    source = write_sources(tmp_path, robot)
+    run_command("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run_command("./test", folder=tmp_path) == "8 postures, 0 failed\n"
 
 
 @pytest.mark.parametrize("robot", ["three_dof", "puma560", "labvolt_5150"])
 def test_single_precision_passes_its_test_program_too(robot: str, tmp_path: Path) -> None:
-    source = written(tmp_path, robot, single=True)
-    run("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
-    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+    source = write_sources(tmp_path, robot, single=True)
+    run_command("gcc", *WARNINGS, *SANITIZERS, source, f"{robot}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run_command("./test", folder=tmp_path) == "8 postures, 0 failed\n"
 
 
 @pytest.mark.parametrize(("robot", "count"), [("iiwa7", 60), ("kinova_gen3", 5)])
@@ -80,9 +80,9 @@ def test_of_seven_joints_the_redundant_one_is_held_where_near_has_it(robot: str,
 
 
 def test_a_wrong_number_fails_the_test_program(tmp_path: Path) -> None:
-    source = written(tmp_path, "three_dof")
+    source = write_sources(tmp_path, "three_dof")
     source.write_text(source.read_text().replace("170.0", "171.0"))
-    run("gcc", *WARNINGS, source, "three_dof_test.c", "-lm", "-o", "test", folder=tmp_path)
+    run_command("gcc", *WARNINGS, source, "three_dof_test.c", "-lm", "-o", "test", folder=tmp_path)
     completed = subprocess.run(["./test"], cwd=tmp_path, capture_output=True, text=True, check=False)
     assert completed.returncode == 8
     assert "not what armkin says" in completed.stdout
@@ -106,17 +106,17 @@ def test_it_compiles_without_a_warning(robot: str, compiler: list[str], tmp_path
         with pytest.raises(armkin.UsageError, match="needs double precision"):
             program(armkin.load(ROBOTS / f"{robot}.yaml"), "arm.c", None, single=True)
         return
-    source = written(tmp_path, robot, single)
+    source = write_sources(tmp_path, robot, single)
     if "c++" in compiler:  # a header for programs in C++
         use = f"{identifier(robot)}_real q[{identifier(robot).upper()}_JOINTS], T[16];"
         use += f"int main() {{ {identifier(robot)}_fk(q, T); return 0; }}"
         (tmp_path / "use.cpp").write_text(f'#include "{robot}.h"\n{use}\n')
-        run(*compiler, "-Wall", "-Wextra", "-Werror", "use.cpp", folder=tmp_path)
+        run_command(*compiler, "-Wall", "-Wextra", "-Werror", "use.cpp", folder=tmp_path)
         return
     # on an AVR double has 32 bits, and its libm functions of float are those of double
     warnings = [flag for flag in WARNINGS if compiler[0] != "avr-gcc" or flag != "-Wdouble-promotion"]
     optimised = "-O0" if compiler[0] == "clang" else "-Os"  # gcc warns of what it finds while it optimises
-    run(*compiler, *warnings, optimised, "-c", source, "-o", "arm.o", folder=tmp_path)
+    run_command(*compiler, *warnings, optimised, "-c", source, "-o", "arm.o", folder=tmp_path)
 
 
 def test_the_files_say_what_they_were_made_from() -> None:
@@ -130,7 +130,7 @@ def test_the_files_say_what_they_were_made_from() -> None:
     ("robot", "count"), [("three_dof", 4000), ("puma560", 2000), ("stanford", 1000), ("jaco_j2n6s300", 400)]
 )
 def test_it_says_what_python_says(robot: str, count: int, tmp_path: Path) -> None:
-    compared = agreement(armkin.load(ROBOTS / f"{robot}.yaml"), tmp_path, count)
+    compared = compare_answers(armkin.load(ROBOTS / f"{robot}.yaml"), tmp_path, count)
     assert compared.different == []
     assert compared.edges <= 0.01 * count
     assert compared.largest_fk < 1e-14
@@ -139,7 +139,7 @@ def test_it_says_what_python_says(robot: str, count: int, tmp_path: Path) -> Non
 
 def test_a_calibrated_arm_takes_and_gives_commanded_values(tmp_path: Path) -> None:
     arm = replace(armkin.load(ROBOTS / "three_dof.yaml"), ratio=np.array([1.01, 0.99, 1.002]))
-    assert agreement(arm, tmp_path, 500).different == []
+    assert compare_answers(arm, tmp_path, 500).different == []
 
 
 def test_the_command_writes_three_files(tmp_path: Path) -> None:
@@ -153,13 +153,15 @@ def test_the_command_writes_three_files(tmp_path: Path) -> None:
 def test_the_source_may_have_any_name(name: str, tmp_path: Path) -> None:
     completed = run_armkin("export", "three_dof", "--c", "--out", tmp_path / f"{name}.c")
     assert completed.code == 0
-    run("gcc", *WARNINGS, f"{name}.c", f"{name}_test.c", "-lm", "-o", "test", folder=tmp_path)
-    assert run("./test", folder=tmp_path) == "8 postures, 0 failed\n"
+    run_command("gcc", *WARNINGS, f"{name}.c", f"{name}_test.c", "-lm", "-o", "test", folder=tmp_path)
+    assert run_command("./test", folder=tmp_path) == "8 postures, 0 failed\n"
 
 
 def test_words_of_a_robot_file_stay_within_their_comment(tmp_path: Path) -> None:
     arm = replace(armkin.load("three_dof"), name="a */ b /* ???/ @real@", path="arm_ik/x*/y.yaml")
-    assert built(tmp_path, replace(arm, joint_names=("*/ int x = ;", "/*/*", "q3"))) == "8 postures, 0 failed\n"
+    assert (
+        run_test_program(tmp_path, replace(arm, joint_names=("*/ int x = ;", "/*/*", "q3"))) == "8 postures, 0 failed\n"
+    )
     assert "from arm_ik/x* /y.yaml" in (tmp_path / "arm.h").read_text()
 
 
@@ -203,10 +205,10 @@ def test_an_arm_that_stands_at_its_target_stays(robot: str, single: bool, tmp_pa
     arm = armkin.load(robot)
     code, (task, geometry), rng = Exported(arm, tmp_path, single), solver(arm, None), np.random.default_rng(8)
     count = 500 if geometry.pairs is not None else 40
-    q = postures(arm, count)
+    q = random_postures(arm, count)
     q = np.where(rng.random(q.shape) < 0.6, np.pi / 4 * rng.integers(-4, 5, q.shape), q)
     q[: count // 2, -2] = 10.0 ** rng.uniform(-9, -2, count // 2)  # beside the wrist's singularity
-    q = np.clip(np.where(arm.prismatic, postures(arm, count), q), arm.lower, arm.upper)
+    q = np.clip(np.where(arm.prismatic, random_postures(arm, count), q), arm.lower, arm.upper)
     q = q.astype(np.float32).astype(float) if single else q
     for near, target in zip(q, targets_of(task, armkin.fk(arm, q), q), strict=True):
         if not single and task.orientation == "full":
@@ -229,7 +231,7 @@ def test_a_calibrated_arm_that_stands_at_its_target_stays(tmp_path: Path) -> Non
 def test_an_arm_asked_for_its_own_pose_in_few_digits_stays(robot: str, tmp_path: Path) -> None:
     """Wrists in line, every second of which moved a joint by up to 180 degrees."""
     arm = armkin.load(robot)
-    code, q = Exported(arm, tmp_path), np.clip(postures(arm, 60), arm.lower, arm.upper)
+    code, q = Exported(arm, tmp_path), np.clip(random_postures(arm, 60), arm.lower, arm.upper)
     q[:, 4] = 0.0
     if robot == "puma560":  # by right angles alone, where the position shows the rounding
         q[0], q[4], q[8] = np.radians(right_angles.POSTURES[robot])
@@ -245,7 +247,7 @@ def test_a_free_joint_that_cannot_stay_at_near_is_asked_elsewhere(robot: str, tm
     """Joint 5 at zero: joints 2, 3, 4 and 6 turn about parallel axes; few values of joint 6 leave the rest in reach."""
     arm = armkin.load(robot)
     code, (task, _) = Exported(arm, tmp_path), solver(arm, None)
-    q = postures(arm, 400)
+    q = random_postures(arm, 400)
     q[:, 2:4] *= 0.2  # all but stretched
     q[:, 4] = 0.0
     for target in targets_of(task, armkin.fk(arm, q), q):
@@ -271,18 +273,18 @@ def test_what_cannot_be_exported_is_refused_in_words(words: list[str], message: 
     assert not completed.out
 
 
-def built(folder: Path, arm: armkin.Arm, single: bool = False) -> str:
+def run_test_program(folder: Path, arm: armkin.Arm, single: bool = False) -> str:
     """What the test program of an arm says."""
     texts = program(arm, "arm.c", single=single)
     for name, text in (("arm.c", texts.source), ("arm.h", texts.header), ("arm_test.c", texts.test)):
         (folder / name).write_text(text)
-    run("gcc", *WARNINGS, "arm.c", "arm_test.c", "-lm", "-o", "test", folder=folder)
-    return run("./test", folder=folder)
+    run_command("gcc", *WARNINGS, "arm.c", "arm_test.c", "-lm", "-o", "test", folder=folder)
+    return run_command("./test", folder=folder)
 
 
 def test_the_test_program_of_a_calibrated_arm_passes(tmp_path: Path) -> None:
     arm = replace(armkin.load("three_dof"), ratio=np.array([1.01, 0.99, 1.002]))
-    assert built(tmp_path, arm) == "8 postures, 0 failed\n"
+    assert run_test_program(tmp_path, arm) == "8 postures, 0 failed\n"
 
 
 def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_path: Path) -> None:
@@ -290,9 +292,9 @@ def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_pat
     text = (ROBOTS / "ar4.yaml").read_text()
     arm = arm_of_file(parse_robot_file(text.replace("a: 0,", "a: 0.3,").replace("alpha: 90,", "alpha: 90.2,")))
     assert "named after that class" in solver(arm, None)[1].why
-    assert built(tmp_path, arm) == "8 postures, 0 failed\n"
+    assert run_test_program(tmp_path, arm) == "8 postures, 0 failed\n"
     assert '"branch 1"' in (tmp_path / "arm.c").read_text()
-    compared = agreement(arm, tmp_path, 100)
+    compared = compare_answers(arm, tmp_path, 100)
     assert compared.different == []
     assert compared.largest < 1e-8
 
@@ -300,7 +302,7 @@ def test_an_arm_a_little_off_its_class_is_written_with_numbered_branches(tmp_pat
 CROOKED = [(70, 20, 100), (30, 200, 10), (-50, 150, 20), (80, 50, 60), (40, 10, 80), (0, 10, 80)]
 
 
-def crooked(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.Arm:
+def crooked_arm(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.Arm:
     """An arm of no class, of so many joints."""
     rows = [
         f"  - {{name: j{k}, {'type: prismatic, limits: [0, 500], ' if k in slides else ''}"
@@ -312,7 +314,7 @@ def crooked(count: int, slides: tuple[int, ...] = (), task: str = "") -> armkin.
 
 def test_five_joints_and_the_tool_s_axis_have_a_form(tmp_path: Path) -> None:
     """None of its postures is far from singular: those farthest from it are taken."""
-    assert built(tmp_path, crooked(5)) == "8 postures, 0 failed\n"
+    assert run_test_program(tmp_path, crooked_arm(5)) == "8 postures, 0 failed\n"
 
 
 @pytest.mark.parametrize("single", [False, True])
@@ -326,14 +328,20 @@ def test_arms_off_their_class_have_a_form(robot: str, single: bool, tmp_path: Pa
         link[k, :3, :3] = link[k, :3, :3] @ rotation_about(0, 2e-4 * (-1) ** k) @ rotation_about(1, 1e-4)
     arm = replace(arm, link=link)
     assert armkin.method(arm)[0].startswith("near ")
-    assert built(tmp_path, arm, single=single).endswith(", 0 failed\n")
+    assert run_test_program(tmp_path, arm, single=single).endswith(", 0 failed\n")
 
 
 @pytest.mark.parametrize(
     ("arm", "why"),
     [
-        (lambda: crooked(4, task="task: pose"), "4 joints for a full pose are searched among the branches of a longer"),
-        (lambda: crooked(6, slides=(0, 2, 4)), "three of its joints are slides; task pose is solved in Python alone"),
+        (
+            lambda: crooked_arm(4, task="task: pose"),
+            "4 joints for a full pose are searched among the branches of a longer",
+        ),
+        (
+            lambda: crooked_arm(6, slides=(0, 2, 4)),
+            "three of its joints are slides; task pose is solved in Python alone",
+        ),
     ],
 )
 def test_classes_without_a_form_say_why(arm: Callable[[], armkin.Arm], why: str) -> None:

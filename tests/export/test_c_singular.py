@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import truth
 from exported import Exported
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
@@ -24,7 +24,7 @@ def test_every_singular_posture_is_an_edge(robot: str, single: bool, tmp_path: P
     Of 300 Pumas with a straight wrist the flag was missing on 288 in float. An arm that stands there stays: where a
     joint is free `near` decides it.
     """
-    arm, screw = shipped(robot)
+    arm, screw = shipped_arm(robot)
     code, (task, _) = Exported(arm, tmp_path, single), solver(arm, None)
     kinds = truth.singular_postures(arm, screw, None, 8, seed=4)
     assert len(kinds) >= 2

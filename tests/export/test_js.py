@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported_js import ask, differences, goals_of
+from exported_js import ask_module, differences, goals_of
 
 import armkin
 import right_angles
@@ -37,12 +37,12 @@ ARMS = (
 )
 
 
-def _random(arm: armkin.Arm, count: int) -> np.ndarray:
+def _random_postures(arm: armkin.Arm, count: int) -> np.ndarray:
     turn = np.where(arm.prismatic, arm.reach / 4, np.pi)
     return np.random.default_rng(5).uniform(-turn, turn, (count, arm.n))
 
 
-def _typed(arm: armkin.Arm, count: int) -> np.ndarray:
+def _typed_postures(arm: armkin.Arm, count: int) -> np.ndarray:
     """Multiples of 15, 30, 45 and 90 degrees, slides a little out: where people ask, and where arms are singular."""
     rng = np.random.default_rng(6)
     step = rng.choice([15.0, 30.0, 45.0, 90.0], (count, 1))
@@ -52,7 +52,7 @@ def _typed(arm: armkin.Arm, count: int) -> np.ndarray:
 
 
 def _tool_down(arm: armkin.Arm, count: int) -> np.ndarray:
-    T = armkin.fk(arm, _random(arm, 3 * count))
+    T = armkin.fk(arm, _random_postures(arm, 3 * count))
     T[:, :3, :3] = np.diag([1.0, -1.0, -1.0])
     solutions = armkin.ik(arm, T)
     postures: np.ndarray = solutions.q[:, 0][solutions.valid[:, 0]][:count]
@@ -63,8 +63,8 @@ def _tool_down(arm: armkin.Arm, count: int) -> np.ndarray:
 @pytest.mark.parametrize("name", ARMS)
 def test_the_module_answers_as_python_does(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name)
-    q = np.concatenate([_random(arm, 60), _typed(arm, 30)])
-    answers = ask(arm, tmp_path, q)
+    q = np.concatenate([_random_postures(arm, 60), _typed_postures(arm, 30)])
+    answers = ask_module(arm, tmp_path, q)
     assert not differences(arm, answers["ik"], armkin.ik(arm, goals_of(arm, q)))
     assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
     assert np.abs(np.array(answers["jacobian"]) - armkin.jacobian(arm, q)).max() < 1e-12 * arm.reach
@@ -79,8 +79,14 @@ def test_the_module_answers_as_python_does(name: str, tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["jaco_j2n6s300", "moveo"])
 def test_the_general_elimination_answers_as_python_does(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name)
-    q = np.concatenate([_random(arm, 30), _typed(arm, 6), _tool_down(arm, 6) if arm.n == 6 else _typed(arm, 0)])
-    assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+    q = np.concatenate(
+        [
+            _random_postures(arm, 30),
+            _typed_postures(arm, 6),
+            _tool_down(arm, 6) if arm.n == 6 else _typed_postures(arm, 0),
+        ]
+    )
+    assert not differences(arm, ask_module(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
 
 
 _DOUBTS = """
@@ -97,7 +103,7 @@ def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
     """An xArm 6 with its tool straight down has two solutions a root: one pass tells them, without a doubt."""
     arm = armkin.load("xarm6")
     q = _tool_down(arm, 8)
-    assert not differences(arm, ask(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
+    assert not differences(arm, ask_module(arm, tmp_path, q)["ik"], armkin.ik(arm, goals_of(arm, q)))
     inside = "import { readFileSync } from 'node:fs';\n" + (tmp_path / "arm.mjs").read_text() + _DOUBTS
     (tmp_path / "doubts.mjs").write_text(inside)
     completed = subprocess.run(["node", "doubts.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True)
@@ -131,14 +137,14 @@ def test_singular_postures_are_those_of_python(name: str, tmp_path: Path) -> Non
     arm = armkin.load(name)
     q = np.deg2rad(SINGULAR[name])
     goals = goals_of(arm, q)
-    for k, answer in enumerate(ask(arm, tmp_path, q, targets=goals)["ik"]):
+    for k, answer in enumerate(ask_module(arm, tmp_path, q, targets=goals)["ik"]):
         assert not differences(arm, [answer], armkin.ik(arm, goals[k : k + 1]))
 
 
 def test_a_calibrated_arm_is_commanded_in_its_own_values(tmp_path: Path) -> None:
     arm = armkin.load(Path(__file__).parents[1] / "robots" / "ratio_arm.yaml")
-    q = _random(arm, 40)
-    answers = ask(arm, tmp_path, q)
+    q = _random_postures(arm, 40)
+    answers = ask_module(arm, tmp_path, q)
     assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
     assert not differences(arm, answers["ik"], armkin.ik(arm, goals_of(arm, q)))
 
@@ -147,14 +153,14 @@ def test_a_calibrated_arm_is_commanded_in_its_own_values(tmp_path: Path) -> None
 def test_the_arm_that_stands_at_its_target_stays(name: str, tmp_path: Path) -> None:
     """Singular postures too, asked for in the six digits that a pose is printed with."""
     arm = armkin.load(name)
-    typed = np.clip(_typed(arm, 40), arm.lower, arm.upper)
+    typed = np.clip(_typed_postures(arm, 40), arm.lower, arm.upper)
     rounded = goals_of(arm, typed).round(6)
     if name == "three_dof":
         rounded, defect = goals_of(arm, typed), np.zeros(len(typed))
     else:
         R = rounded[:, :3, :3]
         defect = np.abs(R.swapaxes(1, 2) @ R - np.eye(3)).max(axis=(1, 2))
-    answers = ask(arm, tmp_path, typed, near=typed, targets=rounded)
+    answers = ask_module(arm, tmp_path, typed, near=typed, targets=rounded)
     stood = 0
     for q, target, rounding, answer in zip(typed, rounded, defect, answers["ik"], strict=True):
         task, _ = solver(arm, None)
@@ -175,7 +181,7 @@ def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it
     targets = goals_of(arm, q)
     targets[:3], targets[3:6] = targets[:3].round(4), targets[3:6].round(5)
     targets[6:] = targets[6:].astype(np.float32)
-    for near, answer in zip(q, ask(arm, tmp_path, q, near=q, targets=targets)["ik"], strict=True):
+    for near, answer in zip(q, ask_module(arm, tmp_path, q, near=q, targets=targets)["ik"], strict=True):
         assert answer["best"] == 0
         np.testing.assert_array_equal(answer["branches"][0]["joints"], near)
 
@@ -192,7 +198,7 @@ def _with_rotation(target: np.ndarray, goal: np.ndarray) -> np.ndarray:
 def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     targets = np.array([[900.0, 0.0, 100.0], [10.0, 20.0, 900.0], [0.0, -400.0, -300.0]])
-    answers = ask(arm, tmp_path, np.zeros((3, 3)), targets=targets)
+    answers = ask_module(arm, tmp_path, np.zeros((3, 3)), targets=targets)
     for target, answer in zip(targets, answers["ik"], strict=True):
         assert answer["best"] is None
         mine = armkin.closest(arm, target)
@@ -203,7 +209,7 @@ def test_a_target_out_of_reach_has_the_nearest_posture_within_limits(tmp_path: P
 def test_hits_are_those_of_python(name: str, tmp_path: Path) -> None:
     arm = armkin.load(name, scene=str(Path(__file__).parents[2] / "examples" / "scenes" / f"{name}.yaml"))
     q = np.random.default_rng(3).uniform(np.maximum(arm.lower, -3), np.minimum(arm.upper, 3), (60, arm.n))
-    answers = ask(arm, tmp_path, q)
+    answers = ask_module(arm, tmp_path, q)
     apart = armkin.clearance(arm, q)
     assert np.abs(np.array([answer["clearance_mm"] for answer in answers["clearance"]]) - apart.mm).max() < 1e-9
     hit = [
@@ -239,8 +245,8 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     rng = np.random.default_rng(8)
     q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
     targets = targets_of(spare.task, armkin.fk(arm, q), q)
-    answers = ask(arm, tmp_path, q, near=q, targets=targets, task=task)
-    assert ask(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == answers["ik"]
+    answers = ask_module(arm, tmp_path, q, near=q, targets=targets, task=task)
+    assert ask_module(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == answers["ik"]
     assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
     assert np.abs(np.array(answers["target"]) - targets).max() < 1e-9
     j, joint = spare.joint, arm.joint_names[spare.joint]
@@ -258,18 +264,18 @@ def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from
     """An iiwa7 folded, its wrist in its shoulder, and stretched upwards (`tests/inverse/test_surfaces.py`)."""
     arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.5})
     q = np.deg2rad([[0, -45, 135, 180, -180, 135], [90, 180, 90, 180, 90, 90], [180, 0, 90, 0, 45, -180]])
-    answers = ask(arm, tmp_path, q, targets=armkin.fk(arm, q))["ik"]
+    answers = ask_module(arm, tmp_path, q, targets=armkin.fk(arm, q))["ik"]
     assert [len(answer["branches"]) for answer in answers] == [2, 4, 1]
     assert not differences(arm, answers, armkin.ik(arm, armkin.fk(arm, q)))
     standing = np.deg2rad([[10.0, 0, 20, 0, 30, 40]])  # an arm that stands on one stays
-    [answer] = ask(arm, tmp_path, standing, near=standing, targets=armkin.fk(arm, standing))["ik"]
+    [answer] = ask_module(arm, tmp_path, standing, near=standing, targets=armkin.fk(arm, standing))["ik"]
     assert [row["joints"] for row in answer["branches"]] == standing.tolist()
 
 
 def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:
     arm = armkin.load("panda", scene=str(ROOT / "examples" / "scenes" / "ur5e.yaml"))
     q = np.array([[0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 0.5], [0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 3.0]])
-    answers = ask(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
+    answers = ask_module(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
     inside, outside = answers["ik"]
     assert (inside["best"], inside["closest"]) == (0, None)
     hit = [bool(row["hits"]) for row in inside["branches"] if row["within_limits"]]

@@ -31,38 +31,38 @@ KINDS: dict[str, Callable[[armkin.Arm], dict[str, Any]]] = {
 }
 
 
-def values(arm: armkin.Arm, count: int = 25) -> np.ndarray:
+def posture_values(arm: armkin.Arm, count: int = 25) -> np.ndarray:
     q = np.random.default_rng(6).uniform(-2, 2, (count, arm.n))
     return q * np.where(arm.prismatic, 100.0, 1.0)
 
 
-def solver(arm: armkin.Arm) -> str:
+def solver_class(arm: armkin.Arm) -> str:
     try:
         return armkin.method(arm)[0]
     except UsageError:
         return "none"
 
 
-def numbers(element: ET.Element | None, name: str) -> np.ndarray:
+def number_attribute(element: ET.Element | None, name: str) -> np.ndarray:
     """An attribute of numbers with spaces between them."""
     assert element is not None
     return np.array((element.get(name) or "").split(), dtype=float)
 
 
-def again(data: dict[str, Any]) -> armkin.Arm:
+def arm_again(data: dict[str, Any]) -> armkin.Arm:
     return arm_of_file(robot_file.parse_robot_file(format_robot_file(data)))
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
 def test_a_table_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
-    q = values(arm)
+    q = posture_values(arm)
     for kind, write in KINDS.items():
-        read_back = again(write(arm))
+        read_back = arm_again(write(arm))
         error = np.abs(armkin.fk(read_back, q) - armkin.fk(arm, q))
         assert error[:, :3, 3].max() < 1e-9, kind
         assert error[:, :3, :3].max() < 1e-12, kind
-        assert solver(read_back) == solver(arm), kind
+        assert solver_class(read_back) == solver_class(arm), kind
         for field in ("lower", "upper", "home", "ratio", "motor_gain", "motor_bias", "pose_joints", "dh_sign"):
             assert np.array_equal(getattr(read_back, field), getattr(arm, field)), (kind, field)
         assert np.array_equal(read_back.max_speed, arm.max_speed, equal_nan=True)
@@ -74,8 +74,8 @@ def test_a_table_is_the_same_arm(path: Path) -> None:
 def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     arm = armkin.load(path)
     turned = actual_arm(arm)
-    read_back = again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
-    q = values(arm)
+    read_back = arm_again(urdf_reader.parse_urdf(write_urdf(arm).encode()).data)
+    q = posture_values(arm)
     error = np.abs(armkin.fk(read_back, q) - armkin.fk(turned, q))
     assert error[:, :3, 3].max() < 1e-9
     assert error[:, :3, :3].max() < 1e-12
@@ -87,7 +87,7 @@ def test_out_to_urdf_and_back_is_the_same_arm(path: Path) -> None:
     assert not np.isfinite(read_back.lower[~limited]).any()
     assert read_back.max_speed == pytest.approx(turned.max_speed, abs=1e-10, nan_ok=True)
     if arm.task not in ("xy", "xy_theta", "xyz", "xyz_yaw"):  # a URDF has no task
-        assert solver(read_back) == solver(arm)
+        assert solver_class(read_back) == solver_class(arm)
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.stem)
@@ -111,11 +111,11 @@ def test_links_are_drawn_from_axis_to_axis() -> None:
         [link] = [link for link in root.iterfind("link") if link.get("name") == f"{name}_link"]
         [joint] = [joint for joint in root.iterfind("joint") if joint.get("name") == following]
         balls = [v for v in link.iterfind("visual") if v.find("geometry/sphere") is not None]
-        end = numbers(balls[-1].find("origin"), "xyz")
+        end = number_attribute(balls[-1].find("origin"), "xyz")
         place = joint.find("origin")
-        roll = numbers(place, "rpy")[0]
+        roll = number_attribute(place, "rpy")[0]
         z = np.array([0, -np.sin(roll), np.cos(roll)])  # both of its turns are about x alone
-        offset = end - numbers(place, "xyz")
+        offset = end - number_attribute(place, "xyz")
         assert np.linalg.norm(offset - (offset @ z) * z) < 1e-6
 
 
@@ -123,7 +123,9 @@ def test_a_makers_table_comes_back_as_printed() -> None:
     """UR5e and Panda through screws: a = -425 and -82.5 with theta 0, as their makers write them."""
     for name, modified in (("ur5e", False), ("panda", True)):
         arm = armkin.load(name)
-        rows = [joint["dh"] for joint in conventions.dh(again(conventions.screws(arm)), modified=modified)["joints"]]
+        rows = [
+            joint["dh"] for joint in conventions.dh(arm_again(conventions.screws(arm)), modified=modified)["joints"]
+        ]
         assert arm.file is not None
         for row, joint in zip(rows, arm.file.joints, strict=True):
             assert joint.dh is not None
@@ -137,7 +139,9 @@ def test_axes_a_hair_from_parallel_have_no_table() -> None:
     arm = from_links(link, [False, False], name="hair")
     with pytest.raises(UsageError, match=r"the axes of q1 and q2 are 5.7e-08 deg from parallel.*screws say it"):
         conventions.dh(arm)
-    error = np.abs(armkin.fk(again(conventions.screws(arm)), values(arm)) - armkin.fk(arm, values(arm)))
+    error = np.abs(
+        armkin.fk(arm_again(conventions.screws(arm)), posture_values(arm)) - armkin.fk(arm, posture_values(arm))
+    )
     assert error[:, :3, 3].max() < 1e-9
 
 
@@ -169,7 +173,7 @@ def test_the_command_writes_each_kind(tmp_path: Path) -> None:
 
 def test_json_is_enough_for_another_program() -> None:
     """Poses from the screws and from the tables in the JSON, by the textbook's formulas alone."""
-    from urdf_chains import rigid, turn
+    from urdf_chains import rigid_transform, rotation_about
 
     answer = json.loads(run("export", "ur5e", "--json").out)
     assert answer["robot"] == "ur5e"
@@ -177,14 +181,17 @@ def test_json_is_enough_for_another_program() -> None:
     T = np.eye(4)
     for joint, value in zip(answer["joints"], q, strict=True):
         w, p = np.array(joint["screw"]["w"]), np.array(joint["screw"]["q"])
-        R = turn(w, value * joint["sign"])
-        T = T @ rigid(R, p - R @ p)
+        R = rotation_about(w, value * joint["sign"])
+        T = T @ rigid_transform(R, p - R @ p)
     zero = answer["zero_pose"]
     roll, pitch, yaw = np.radians(zero["rpy"])
-    T = T @ rigid(turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll), np.array(zero["xyz"]))
+    T = T @ rigid_transform(
+        rotation_about([0, 0, 1], yaw) @ rotation_about([0, 1, 0], pitch) @ rotation_about([1, 0, 0], roll),
+        np.array(zero["xyz"]),
+    )
     assert armkin.fk(armkin.load("ur5e"), q) == pytest.approx(T, abs=1e-9)
     D = np.eye(4)
     for row, value in zip(answer["dh_standard"]["rows"], q, strict=True):
-        D = D @ rigid(turn([0, 0, 1], value + np.radians(row["theta"])), np.array([0, 0, row["d"]]))
-        D = D @ rigid(turn([1, 0, 0], np.radians(row["alpha"])), np.array([row["a"], 0, 0]))
+        D = D @ rigid_transform(rotation_about([0, 0, 1], value + np.radians(row["theta"])), np.array([0, 0, row["d"]]))
+        D = D @ rigid_transform(rotation_about([1, 0, 0], np.radians(row["alpha"])), np.array([row["a"], 0, 0]))
     assert pytest.approx(T, abs=1e-9) == D

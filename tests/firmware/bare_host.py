@@ -57,7 +57,7 @@ class Batch:
         return motion_frame.motion(tag, self.axes, self.start, self.end, self.segments, at_rest=at_rest, brake=brake)
 
 
-def batches(
+def cut_batches(
     axes: Sequence[int],
     start: Sequence[int],
     segments: Sequence[Segment],
@@ -233,7 +233,7 @@ class BareHost:
         return status
 
 
-def cruise(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]:
+def cruise_segments(rate: float, seconds: float, share: Sequence[float]) -> list[Segment]:
     """Up to `rate` ticks/s and down again in RAMP each way; axis i makes `share[i]` steps a tick."""
     segments: list[Segment] = []
     time = 0.0

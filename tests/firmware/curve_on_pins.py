@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from bare_host import BareHost, Batch, batches
+from bare_host import BareHost, Batch, cut_batches
 from emulator import EmulatedBoard, Trace
 
 import armkin
@@ -56,7 +56,7 @@ class Laid:
         return distance
 
 
-def lay(moves: dict[str, Any], size: int = 4) -> Laid:
+def lay_curve(moves: dict[str, Any], size: int = 4) -> Laid:
     """Plan moves whose last stretch is a curve, cut that into frames of three_dof's board."""
     arm = armkin.load("three_dof")
     plan = armkin.path(arm, moves)
@@ -69,11 +69,11 @@ def lay(moves: dict[str, Any], size: int = 4) -> Laid:
     )
     [move] = laid.moves()
     segments = list(move.segments)
-    work = batches((0, 1, 2), start.tolist(), segments, size, brake=move.brake)
+    work = cut_batches((0, 1, 2), start.tolist(), segments, size, brake=move.brake)
     return Laid(plan, curve, segments, work, start.tolist())
 
 
-def ready(board: EmulatedBoard, laid: Laid) -> BareHost:
+def ready_host(board: EmulatedBoard, laid: Laid) -> BareHost:
     """The board configured for the arm, which stands at the curve's start."""
     host = BareHost(board)
     host.run(0.02)
@@ -83,7 +83,7 @@ def ready(board: EmulatedBoard, laid: Laid) -> BareHost:
     return host
 
 
-def predicted(segments: Sequence[Segment], start: Sequence[int]) -> list[Array]:
+def predicted_steps(segments: Sequence[Segment], start: Sequence[int]) -> list[Array]:
     """When every motor steps by PROTOCOL.md's arithmetic: cycles since the motion's begin, for each motor."""
     cycle = 0
     places = np.array([count * STEP + HALF for count in start])
@@ -119,7 +119,7 @@ class Run:
 def whole_run(laid: Laid) -> Run:
     """Stream it all, then look at every edge."""
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as board:
-        host = ready(board, laid)
+        host = ready_host(board, laid)
         status = host.stream(laid.work, poll=0.05)
         stats, trace = board.stats(), board.trace()
         axes = [stats["axes"][name] for name in "XYZ"]
@@ -130,7 +130,7 @@ def whole_run(laid: Laid) -> Run:
             status.overruns,
             sum(sum(a["violations"].values()) for a in axes),
             status.error,
-            late_us(trace, predicted(laid.segments, laid.start)),
+            late_us(trace, predicted_steps(laid.segments, laid.start)),
             float(laid.off(counts_of(trace, laid.start)[1][::7]).max()),
             len(laid.segments) / laid.curve.duration,
         )
@@ -170,12 +170,12 @@ class Held:
     milliseconds: float  # to a stop, from the cause
 
 
-def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
+def hold_curve(laid: Laid, share: float, *, cable: bool = False) -> Held:
     """HOLD, or no more bytes in either direction (cable), after a share of the curve's time."""
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as board:
-        host = ready(board, laid)
+        host = ready_host(board, laid)
         moment = share * laid.curve.duration
-        _until(host, laid.work, moment)
+        _stream_until(host, laid.work, moment)
         begin = board.control("cycles")["cycle"]
         if not cable:
             host.run(0.0, protocol.encode_frame(protocol.hold(0)))
@@ -187,11 +187,11 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
         if cable:  # the board notices 500 ms after the last byte
             begin = int(trace.edges("uart.in")[0][trace.edges("uart.in")[0] <= begin][-1]) + CLOCK // 2
         is_known = bool((rest_counts == counts[-1]).all()) and (status.known & 0b111) == 0b111
-        accel = _accelerations(laid.arm, trace, laid.start, begin)
+        accel = _greatest_acceleration(laid.arm, trace, laid.start, begin)
         host.hello(77)
         host.order(protocol.enable(0, 3))
         goal = laid.start if (rest_counts != laid.start).any() else [count + 200 for count in laid.start]
-        after = host.stream(_straight(rest_counts.tolist(), goal))
+        after = host.stream(_straight_batches(rest_counts.tolist(), goal))
         return Held(
             is_known,
             float(laid.off(rest_counts[None])[0]),
@@ -202,7 +202,7 @@ def held(laid: Laid, share: float, *, cable: bool = False) -> Held:
         )
 
 
-def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
+def _stream_until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
     """Stream batches as `BareHost.stream` does, and stop talking so long [s] after the motion began."""
     begun: float | None = None
     free, sent, acknowledged = host.status().free, 0, 0
@@ -227,13 +227,13 @@ def _until(host: BareHost, work: Sequence[Batch], moment: float) -> None:
     host.sequence = (first + acknowledged) % 256
 
 
-def _straight(start: list[int], end: list[int]) -> list[Batch]:
+def _straight_batches(start: list[int], end: list[int]) -> list[Batch]:
     """A straight joint move between counts."""
     move = straight_line(start, end, 1.0, 2.0)
-    return batches((0, 1, 2), start, list(move.segments), 4)
+    return cut_batches((0, 1, 2), start, list(move.segments), 4)
 
 
-def _accelerations(arm: armkin.Arm, trace: Trace, start: Sequence[int], begin: int) -> float:
+def _greatest_acceleration(arm: armkin.Arm, trace: Trace, start: Sequence[int], begin: int) -> float:
     """Greatest acceleration of a joint after a cycle, as a share: parabolas fitted to the edges of WINDOW.
 
     An edge says where a motor is exactly: on the border between two counts.

@@ -17,7 +17,7 @@ from other_programs import OURS
 from starting_elsewhere import KINDS
 
 
-def start(board: EmulatedBoard) -> Start:
+def starter_of(board: EmulatedBoard) -> Start:
     """Every emulator is the same chip after a power-on."""
 
     def begin() -> Emulated:

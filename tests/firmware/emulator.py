@@ -44,7 +44,7 @@ _WARM: list[subprocess.Popen[bytes]] = []
 
 
 @atexit.register
-def _end() -> None:
+def _end_warm() -> None:
     for process in _WARM:
         process.communicate()
 
@@ -53,7 +53,7 @@ class BoardError(RuntimeError):
     """The emulator refused a command, or died."""
 
 
-def make(*arguments: str) -> None:
+def run_make(*arguments: str) -> None:
     """Run make in one process at a time (tests run in parallel); its output only if it fails."""
     BUILD.mkdir(exist_ok=True)
     with (BUILD / ".lock").open("w") as lock:
@@ -66,15 +66,15 @@ def make(*arguments: str) -> None:
 def build_simulator(board: str = "uno_cnc_shield") -> list[str]:
     """The command that starts the emulator of a board."""
     if board == PICO:
-        make("-C", str(FIRMWARE / "sim" / "rp2040"))
+        run_make("-C", str(FIRMWARE / "sim" / "rp2040"))
         return [sys.executable, str(FIRMWARE / "sim" / "rp2040" / "simboard.py")]
-    make("-C", str(FIRMWARE / "sim"))
+    run_make("-C", str(FIRMWARE / "sim"))
     return [str(BUILD / "simboard")]
 
 
 def build_firmware(board: str) -> Path:
     """The program as its emulator takes it: an ELF, or a UF2 file."""
-    make("-C", str(FIRMWARE), f"BOARD={board}")
+    run_make("-C", str(FIRMWARE), f"BOARD={board}")
     return BUILD / f"{board}.{'uf2' if board == PICO else 'elf'}"
 
 

@@ -59,7 +59,7 @@ class Talk:
         return compared
 
 
-def talks() -> list[Talk]:
+def read_talks() -> list[Talk]:
     """All conversations of firmware/golden."""
     conversations = []
     for path in sorted((FIRMWARE / "golden").glob("*.talk")):

@@ -1,7 +1,7 @@
 """A model of what tick interrupt and main loop share: queue_tail, queue_head, left, now, settled, stretch, prepared.
 
-Every step is one access that an interrupt may come before or after. `explore` visits every state that any interleaving
-reaches, and returns the first promise that one of them breaks. The words are those of motion.c and dda.h.
+Every step is one access that an interrupt may come before or after. `explore_states` visits every state that any
+interleaving reaches, and returns the first promise that one of them breaks. The words are those of motion.c and dda.h.
 """
 
 from __future__ import annotations
@@ -44,26 +44,26 @@ class BrokenError(Exception):
     """A promise is broken."""
 
 
-def promise(is_kept: bool, law: str) -> None:
+def check_promise(is_kept: bool, law: str) -> None:
     if not is_kept:
         raise BrokenError(law)
 
 
-def load(s: State) -> State:
+def load_segment(s: State) -> State:
     if s.tail == s.head:
         return replace(s, now=NONE, fed=False)
     slot = s.tail % SLOTS
-    promise(s.slots[slot] > 0, "the interrupt takes up a segment that is not written")
+    check_promise(s.slots[slot] > 0, "the interrupt takes up a segment that is not written")
     rates = s.rates if s.prepared else s.slots[slot]
     return replace(s, now=slot + 1, left=s.slots[slot], fed=True, rates=rates, prepared=False)
 
 
-def prepare(s: State) -> State:
+def prepare_short_tick(s: State) -> State:
     """The short tick, behind the steps of a segment's last one: the next one's rates, if it is there."""
     after = (s.tail + 1) % (2 * SLOTS)
     if s.now == NONE or s.left or after == s.head:
         return s
-    promise(s.slots[after % SLOTS] > 0, "the interrupt takes the rates of a segment that is not written")
+    check_promise(s.slots[after % SLOTS] > 0, "the interrupt takes the rates of a segment that is not written")
     return replace(s, rates=s.slots[after % SLOTS], prepared=True)
 
 
@@ -71,27 +71,27 @@ def interrupt(s: State) -> State:
     """What follows an edge: dda_next()."""
     s = replace(s, pending=False)
     if s.left == 0:
-        s = load(replace(s, tail=(s.tail + 1) % (2 * SLOTS)))
+        s = load_segment(replace(s, tail=(s.tail + 1) % (2 * SLOTS)))
         if s.now == NONE:
             return s
-    promise(s.stretch in ((1, 0), (2, 1)), "the interrupt reads half of a stretch")
-    promise(s.rates == s.slots[s.now - 1], "a segment moves by another one's rates")
+    check_promise(s.stretch in ((1, 0), (2, 1)), "the interrupt reads half of a stretch")
+    check_promise(s.rates == s.slots[s.now - 1], "a segment moves by another one's rates")
     return replace(s, left=s.left - 1, fed=True)
 
 
 def settle_to(s: State, tail: int) -> State:
     while s.settled != tail:
         slot = s.settled % SLOTS
-        promise(s.slots[slot] > 0, "a segment is counted that is not there")
+        check_promise(s.slots[slot] > 0, "a segment is counted that is not there")
         s = replace(s, counts=s.counts + s.slots[slot], settled=(s.settled + 1) % (2 * SLOTS))
     return s
 
 
-def free(s: State) -> int:
+def free_slots(s: State) -> int:
     return SLOTS - (s.head - s.settled) % (2 * SLOTS)
 
 
-def out(s: State, running: int, left: int) -> int:
+def ticks_out(s: State, running: int, left: int) -> int:
     """motion_counts(): ticks that are out."""
     return s.counts + (s.slots[running - 1] - left - 1 if running else 0)
 
@@ -101,17 +101,17 @@ def out(s: State, running: int, left: int) -> int:
 Step = Callable[[State], State | None]
 
 
-def lock(s: State) -> State:
+def lock_interrupts(s: State) -> State:
     return replace(s, locked=True)
 
 
-def unlock(s: State) -> State:
+def unlock_interrupts(s: State) -> State:
     return replace(s, locked=False)
 
 
-def write(ticks: int) -> Step:
+def write_segment(ticks: int) -> Step:
     def step(s: State) -> State | None:
-        if not free(s) or s.ghost_queued == MOST:
+        if not free_slots(s) or s.ghost_queued == MOST:
             return None
         slots = tuple(ticks if i == s.head % SLOTS else t for i, t in enumerate(s.slots))
         return replace(s, slots=slots, ghost_queued=s.ghost_queued + 1, ghost_due=s.ghost_due + ticks)
@@ -119,7 +119,7 @@ def write(ticks: int) -> Step:
     return step
 
 
-def publish(s: State) -> State:
+def publish_head(s: State) -> State:
     return replace(s, head=(s.head + 1) % (2 * SLOTS))
 
 
@@ -137,19 +137,19 @@ def read_now_low(
     return replace(s, seen=(s.now % 2,))
 
 
-def look(s: State) -> State | None:
+def look_at_rest(s: State) -> State | None:
     """motion_poll(): at rest?"""
     high = 1 if s.now else 0
     return None if high or s.seen[0] else replace(s, seen=())
 
 
 def arrive_or_start(s: State) -> State | None:
-    promise(not s.fed and not s.pending, "the timer is started while it runs")
+    check_promise(not s.fed and not s.pending, "the timer is started while it runs")
     if s.settled == s.head:
-        promise(s.counts == s.ghost_edges == s.ghost_due, "the arm rests, and its count is not that of the pins")
+        check_promise(s.counts == s.ghost_edges == s.ghost_due, "the arm rests, and its count is not that of the pins")
         return None
-    s = load(s)
-    promise(s.now != NONE, "the timer is started with nothing to do")
+    s = load_segment(s)
+    check_promise(s.now != NONE, "the timer is started with nothing to do")
     return replace(s, left=s.left - 1)
 
 
@@ -165,10 +165,10 @@ def read_running_then(s: State) -> State:
     return replace(s, seen=(*s.seen, s.left, s.ghost_edges - s.pending))
 
 
-def tell(s: State) -> State:
+def tell_count(s: State) -> State:
     tail, running, left, edges = s.seen
     s = settle_to(s, tail)
-    promise(out(s, running, left) == edges, "a count is told that the pins never had")
+    check_promise(ticks_out(s, running, left) == edges, "a count is told that the pins never had")
     return replace(s, seen=())
 
 
@@ -197,27 +197,33 @@ def stand_still(s: State) -> State:
 
 def stand_still_prepared(s: State) -> State:
     s = settle_to(s, s.tail)
-    s = replace(s, counts=out(s, s.now, s.left), now=NONE, left=0, stretch=(1, 0))
-    promise(s.counts == s.ghost_edges, "a hold ends with a count that is not that of the pins")
+    s = replace(s, counts=ticks_out(s, s.now, s.left), now=NONE, left=0, stretch=(1, 0))
+    check_promise(s.counts == s.ghost_edges, "a hold ends with a count that is not that of the pins")
     return replace(s, head=s.tail, settled=s.tail, slots=(0,) * SLOTS, ghost_due=s.counts)
 
 
 SETTLE: tuple[Step, ...] = (read_tail, settle_seen)
 CALLS: dict[str, tuple[Step, ...]] = {
-    **{f"append {n}": (write(n), publish) for n in TICKS},
-    "poll": (*SETTLE, read_now_low, look, *SETTLE, arrive_or_start),
-    "counts": (lock, read_running, unlock, tell),
-    "hold": (lock, stretch_low, stretch_high, unlock),
-    "stand still": (lock, stop_timer, unlock, stand_still),
+    **{f"append {n}": (write_segment(n), publish_head) for n in TICKS},
+    "poll": (*SETTLE, read_now_low, look_at_rest, *SETTLE, arrive_or_start),
+    "counts": (lock_interrupts, read_running, unlock_interrupts, tell_count),
+    "hold": (lock_interrupts, stretch_low, stretch_high, unlock_interrupts),
+    "stand still": (lock_interrupts, stop_timer, unlock_interrupts, stand_still),
 }
 # What would go wrong without each of the precautions.
 MUTANTS: dict[str, tuple[str, tuple[Step, ...]]] = {
-    "published before it is written": ("append 2", (publish, write(2))),
-    "looked at once": ("poll", (*SETTLE, read_now_low, look, arrive_or_start)),
-    "counted without a lock": ("counts", (read_running_first, read_running_then, tell)),
+    "published before it is written": ("append 2", (publish_head, write_segment(2))),
+    "looked at once": ("poll", (*SETTLE, read_now_low, look_at_rest, arrive_or_start)),
+    "counted without a lock": ("counts", (read_running_first, read_running_then, tell_count)),
     "stretched without a lock": ("hold", (stretch_low, stretch_high)),
-    "rates of a segment that a stop has dropped": ("stand still", (lock, stop_timer, unlock, stand_still_prepared)),
-    "an edge forgotten at the stop": ("stand still", (lock, stop_timer_forgetting, unlock, stand_still)),
+    "rates of a segment that a stop has dropped": (
+        "stand still",
+        (lock_interrupts, stop_timer, unlock_interrupts, stand_still_prepared),
+    ),
+    "an edge forgotten at the stop": (
+        "stand still",
+        (lock_interrupts, stop_timer_forgetting, unlock_interrupts, stand_still),
+    ),
 }
 
 
@@ -227,7 +233,7 @@ def successors(s: State, calls: dict[str, tuple[Step, ...]]) -> Iterator[State]:
     if s.pending and not s.locked:
         interrupted = interrupt(s)
         yield interrupted
-        yield prepare(interrupted)
+        yield prepare_short_tick(interrupted)
     if not s.call:
         yield from (replace(s, call=name) for name in calls)
         return
@@ -239,7 +245,7 @@ def successors(s: State, calls: dict[str, tuple[Step, ...]]) -> Iterator[State]:
         yield replace(after, at=s.at + 1)
 
 
-def explore(calls: dict[str, tuple[Step, ...]]) -> tuple[int, str]:
+def explore_states(calls: dict[str, tuple[Step, ...]]) -> tuple[int, str]:
     """States that any interleaving reaches, and the promise that one of them breaks ("": none)."""
     waiting = [State()]
     reached = set(waiting)

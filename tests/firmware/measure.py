@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, batches, cruise, image_for, run_up
-from emulator import BUILD, FIRMWARE, EmulatedBoard, make
+from bare_host import AXES, CLOCK, STEPPERS, WIDE, BareHost, Batch, cruise_segments, cut_batches, image_for, run_up
+from emulator import BUILD, FIRMWARE, EmulatedBoard, run_make
 from numpy.typing import NDArray
 
 import armkin
@@ -30,7 +30,7 @@ def counts_at_home(board: str) -> dict[int, int]:
 
 def slow_elf(board: str) -> Path:
     """The firmware built for 115200 baud."""
-    make("-C", str(FIRMWARE), f"BOARD={board}", "BAUD=115200")
+    run_make("-C", str(FIRMWARE), f"BOARD={board}", "BAUD=115200")
     return BUILD / f"{board}-115200.elf"
 
 
@@ -50,13 +50,13 @@ class Stepping:
     stack_free: int
 
 
-def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
+def measure_stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
     """Every stepper one step a tick, alternating directions and reversing half way; the first servo moves along."""
     steppers = STEPPERS[board]
     axes = tuple(range(steppers + 1))
     share = [(-1.0) ** i for i in range(steppers)] + [100 / (rate * seconds)]
-    segments_out = cruise(rate, seconds, share)
-    back = cruise(rate, seconds, [-s for s in share])
+    segments_out = cruise_segments(rate, seconds, share)
+    back = cruise_segments(rate, seconds, [-s for s in share])
     image = image_for(board, replace(WIDE, max_rate=60_000))
     row = protocol.RowImage(-(1 << 28), 1 << 28, (1, 1) + (0,) * (AXES[board] - 2))
     limit = replace(image.axes[0], lower=-(1 << 27), upper=1 << 27)
@@ -67,8 +67,8 @@ def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
         host.setup(image, counts_at_home(board))
         emulated.control("clear")
         start = [0] * steppers + [1500]
-        plan = batches(axes, start, segments_out, 4)
-        plan += batches(axes, plan[-1].end, back, 4)
+        plan = cut_batches(axes, start, segments_out, 4)
+        plan += cut_batches(axes, plan[-1].end, back, 4)
         status = host.stream(plan, poll=0.01)
         stats = emulated.stats()
         named = [stats["axes"][name] for name in list(stats["axes"])[:steppers]]
@@ -93,11 +93,11 @@ def stepping(board: str, rate: float, seconds: float = 0.6) -> Stepping:
         )
 
 
-def ceiling(board: str, rates: range, jitter_us: float = 10.0) -> float:
-    """The highest of the rates at which `stepping` is still without fault."""
+def highest_rate(board: str, rates: range, jitter_us: float = 10.0) -> float:
+    """The highest of the rates at which `measure_stepping` is still without fault."""
     best = 0.0
     for rate in rates:
-        measured = stepping(board, rate, seconds=1.0)
+        measured = measure_stepping(board, rate, seconds=1.0)
         if (
             not measured.exact
             or measured.error
@@ -135,7 +135,7 @@ def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -
         steps += [(3, -2, 2, -1), (2, -1, 1, -1), (1, -1, 1, -1)]
         # a pause in front, so that the queue is full when it matters
         work = [whole_steps(100, 9600, 0, (0, 0, 0, 0))] + [changing(i, counts) for i, counts in enumerate(steps)]
-        plan = batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
+        plan = cut_batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
         status = host.stream(plan, slice_s=0.25e-3, bytes_ahead=300)  # more than it promises, but it keeps up
         x = emulated.stats()["axes"]["X"]
         seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / CLOCK
@@ -169,7 +169,7 @@ class Hold:
     known: bool
 
 
-def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold:
+def measure_hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold:
     """X at `rate` counts/s, Y at half of it; then HOLD, or A0 to ground, or no more bytes from the host."""
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as emulated:
         host = BareHost(emulated)
@@ -179,7 +179,7 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         interval = round(CLOCK / rate)
         long = [whole_steps(15_000, interval, 0, (15_000, -7_500))] * 2
         ramp = run_up(rate, rate / accel, (1.0, -0.5))
-        for batch in batches((0, 1), (0, 0), ramp + long + ramp[::-1][:4], 6, at_rest=False):
+        for batch in cut_batches((0, 1), (0, 0), ramp + long + ramp[::-1][:4], 6, at_rest=False):
             host.order(batch.payload(0))
         host.run(0.3)
         host.status()
@@ -210,7 +210,7 @@ def hold(rate: float = 10_000, accel: int = 50_000, cause: str = "hold") -> Hold
         )
 
 
-def reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, float, int]:
+def measure_reversing(board: str, interval: int, high: int = 10) -> tuple[float, float, float, int]:
     """Every segment turns every axis round, `interval` cycles a tick, DRV8825 timing.
 
     Shortest DIR set-up, STEP high and low [us], violations. `high`: STEP's configured high time in 0.1 us.
@@ -250,7 +250,7 @@ class Turning:
     stack_free: int
 
 
-def turning(board: str, interval: int, ticks: int = 100, count: int = 200) -> Turning:
+def measure_turning(board: str, interval: int, ticks: int = 100, count: int = 200) -> Turning:
     """`count` segments of one step a tick on every stepper, `interval` cycles a tick, each the other way."""
     steppers = STEPPERS[board]
     with EmulatedBoard(board, speed="step", driver="drv8825") as emulated:
@@ -263,7 +263,7 @@ def turning(board: str, interval: int, ticks: int = 100, count: int = 200) -> Tu
         emulated.control("clear")
         work = [whole_steps(100, 16_000, 0, (0,) * steppers)]  # a pause in front, while the queue fills
         work += [whole_steps(ticks, interval, 0, ((-1) ** n * ticks,) * steppers) for n in range(count)]
-        plan = batches(tuple(range(steppers)), (0,) * steppers, work, 6)
+        plan = cut_batches(tuple(range(steppers)), (0,) * steppers, work, 6)
         status = host.stream(plan, poll=0.01, slice_s=0.25e-3)
         stats = emulated.stats()
         figures = list(stats["axes"].values())[:steppers]
@@ -290,7 +290,7 @@ class Noise:
     seconds: float  # simulated
 
 
-def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
+def measure_noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
     """X, Y, Z along a line; `rate` of the bytes flipped and as many dropped, each way."""
     share = (3, -5, 2)
     with EmulatedBoard("uno_cnc_shield", speed="step", seed=seed, trace=True) as emulated:
@@ -311,7 +311,9 @@ def noise(seed: int, segments: int = 1000, rate: float = 0.01) -> Noise:
             remainder = tuple(e - a - left * s for e, a, s in zip(end, counts, share, strict=True))
             if any(remainder):
                 work.insert(0, whole_steps(20, 16_000, 0, remainder))
-            status = host.stream(batches((0, 1, 2), counts, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05)
+            status = host.stream(
+                cut_batches((0, 1, 2), counts, work, 3), resend=0.009, slice_s=2e-3, window=3, poll=0.05
+            )
             counts = (status.counts[0], status.counts[1], status.counts[2])
         emulated.control("restore")
         trace = emulated.trace()
@@ -337,7 +339,7 @@ class Smooth:
     worst: float  # greatest deviation of any step of the move, over max(60 us, 2 % of its period)
 
 
-def smoothness(speed: float) -> list[Smooth]:
+def measure_smoothness(speed: float) -> list[Smooth]:
     """The published move of three axes, at a share of the joints' speeds: from the edges on the pins."""
     arm = armkin.load("three_dof")
     configuration = configure(arm)
@@ -348,18 +350,18 @@ def smoothness(speed: float) -> list[Smooth]:
         host = BareHost(emulated)
         host.run(0.02)
         host.setup(configuration.image, {0: 0, 1: 0, 2: 0})
-        status = host.stream(batches((0, 1, 2), (0, 0, 0), work, 5), give_up=400.0, poll=0.1)
+        status = host.stream(cut_batches((0, 1, 2), (0, 0, 0), work, 5), give_up=400.0, poll=0.1)
         assert status.error == 0, status
         assert status.counts[:3] == tuple(cut.end.tolist())
         trace = emulated.trace()
         law = cut.trajectory.stretches[0].law  # type: ignore[attr-defined]
         return [
-            _smooth(name, trace.rises(f"{name}.STEP") / CLOCK, int(n), law)
+            _smooth_of(name, trace.rises(f"{name}.STEP") / CLOCK, int(n), law)
             for name, n in zip("XYZ", cut.end, strict=True)
         ]
 
 
-def _smooth(name: str, seconds: NDArray[np.float64], steps: int, law: Profile) -> Smooth:
+def _smooth_of(name: str, seconds: NDArray[np.float64], steps: int, law: Profile) -> Smooth:
     """Intervals between an axis's steps against the trapezoid's: when it has passed 1/2, 3/2, ... steps."""
     share = (np.arange(abs(steps)) + 0.5) / abs(steps)
     ramp = law.peak / law.accel

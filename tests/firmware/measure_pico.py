@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from bare_host import WIDE, BareHost, Batch, batches, image_for
+from bare_host import WIDE, BareHost, Batch, cut_batches, image_for
 from emulator import PICO, EmulatedBoard
 from numpy.typing import NDArray
 
@@ -21,7 +21,9 @@ DRV8825 = {"step_high": 19, "step_low": 19, "dir_setup": 7, "wake": 2}
 FAST = replace(WIDE, max_rate=250_000, max_accel=(1 << 24) - 1)
 
 
-def ready(board: EmulatedBoard, axis: protocol.AxisImage = FAST, *, baud: int = 250_000, **changes: object) -> BareHost:
+def ready_host(
+    board: EmulatedBoard, axis: protocol.AxisImage = FAST, *, baud: int = 250_000, **changes: object
+) -> BareHost:
     """A host whose session is open, every axis known, drivers and servos on."""
     host = BareHost(board, baud)
     host.run(0.05)
@@ -29,7 +31,7 @@ def ready(board: EmulatedBoard, axis: protocol.AxisImage = FAST, *, baud: int = 
     return host
 
 
-def net(board: EmulatedBoard) -> tuple[int, ...]:
+def net_steps(board: EmulatedBoard) -> tuple[int, ...]:
     return tuple(board.net().values())
 
 
@@ -67,18 +69,18 @@ class Stepping:
     error: int
 
 
-def stepping(interval: int, ticks: int = 2000, held_off_us: float = 0.0) -> Stepping:
+def measure_stepping(interval: int, ticks: int = 2000, held_off_us: float = 0.0) -> Stepping:
     """Up to one tick in `interval` cycles, there and back; every interrupt comes `held_off_us` later."""
     ramp = [i for i in (1000, 500, 333) if i > 1.1 * interval]
     pairs = [(100, i) for i in ramp] + [(ticks, interval)] + [(100, i) for i in reversed(ramp)]
     segments_out = [whole_steps(n, i, 0, tuple((-1) ** k * n for k in SIX)) for n, i in pairs]
     back = [replace(s, rates=tuple(-r for r in s.rates)) for s in segments_out]
     with EmulatedBoard(PICO, speed="step", trace=True, driver="drv8825") as board:
-        host = ready(board)
+        host = ready_host(board)
         board.control(f"hold-off {held_off_us}us")
         board.control("clear")
-        work = batches(SIX, (0,) * 6, segments_out, 4)
-        work += batches(SIX, work[-1].end, back, 4)
+        work = cut_batches(SIX, (0,) * 6, segments_out, 4)
+        work += cut_batches(SIX, work[-1].end, back, 4)
         status = host.stream(work, poll=0.002)
         trace, figures = board.trace(), board.stats()["axes"].values()
         first, lateness = trace.rises("X.STEP")[0], 0.0
@@ -87,7 +89,7 @@ def stepping(interval: int, ticks: int = 2000, held_off_us: float = 0.0) -> Step
             expected = edges_by_the_protocol(segments_out, axis) - begin
             came = trace.rises(f"{name}.STEP")[: len(expected)] - first
             lateness = max(lateness, float(np.abs(came - CYCLES * expected[: len(came)]).max()) / 125)
-        exact = status.error == 0 and status.counts[:6] == work[-1].end == net(board)
+        exact = status.error == 0 and status.counts[:6] == work[-1].end == net_steps(board)
         exact = exact and all(f["positive"] == f["negative"] > ticks // 2 for f in figures)
         return Stepping(
             CLOCK / interval,
@@ -106,7 +108,7 @@ def asleep_at(interval: int, held_off_us: float) -> float:
     """Share of a cruise of all six axes in which the processor sleeps; no segments come."""
     ticks, step = 10_000, (1, -1, 1, -1, 1, -1)
     with EmulatedBoard(PICO, speed="step") as board:
-        host = ready(board)
+        host = ready_host(board)
         board.control(f"hold-off {held_off_us}us")
         work = (
             whole_steps(200, 1000, 0, tuple(200 * s for s in step)),
@@ -123,13 +125,13 @@ def segments_per_second(
 ) -> tuple[float, bool]:
     """Streams short segments; what came out at the pins a second, and whether all of it was exact."""
     with EmulatedBoard(PICO, speed="step", link=link) as board:
-        host = ready(board, baud=250_000 if link == "uart" else 12_000_000)
+        host = ready_host(board, baud=250_000 if link == "uart" else 12_000_000)
         board.control("clear")
         interval = round(CLOCK / rate / ticks)
         # a pause in front, so that the queue is full when it matters
         work = [whole_steps(100, 60_000 if link == "uart" else 6000, 0, (0,) * len(axes))]
         segment = whole_steps(ticks, interval, 0, tuple((-1) ** k for k in range(len(axes))))
-        plan = batches(axes, (0,) * len(axes), work + [segment] * count, batch)
+        plan = cut_batches(axes, (0,) * len(axes), work + [segment] * count, batch)
         status = host.stream(plan, slice_s=0.25e-3)
         x = board.stats()["axes"]["X"]
         seconds = (x["last_step_cycle"] - x["first_step_cycle"]) / board.clock_hz
@@ -140,7 +142,7 @@ def segments_per_second(
 def first_step_ms(link: Literal["uart", "usb"]) -> float:
     """From the end of the first batch's last byte to the first edge, at rest."""
     with EmulatedBoard(PICO, speed="step", trace=True, link=link) as board:
-        host = ready(board)
+        host = ready_host(board)
         work = (whole_steps(50, 2500, 0, (50,) * 6),)
         before = int(board.control("cycles")["cycle"])
         payload = Batch(SIX, (0,) * 6, work, at_rest=True).payload(0)

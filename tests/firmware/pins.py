@@ -9,7 +9,7 @@ import numpy as np
 from emulator import CLOCK_HZ, EmulatedBoard
 
 
-def net(board: EmulatedBoard) -> list[int]:
+def net_steps(board: EmulatedBoard) -> list[int]:
     """Net steps on the pins of X, Y, Z."""
     net_of = board.net()
     return [net_of[axis] for axis in "XYZ"]
@@ -18,10 +18,10 @@ def net(board: EmulatedBoard) -> list[int]:
 def at_rest(board: EmulatedBoard) -> list[int]:
     """Net steps once they have not changed for 0.15 s."""
     end = time.monotonic() + 60
-    before = net(board)
+    before = net_steps(board)
     while time.monotonic() < end:
         board.wait(0.15)
-        counts = net(board)
+        counts = net_steps(board)
         if counts == before:
             return counts
         before = counts
@@ -40,9 +40,9 @@ def on_the_line(counts: Sequence[int], start: Sequence[int], end: Sequence[int])
 def rests_within(board: EmulatedBoard, seconds: float) -> None:
     """The pins are still after at most so much simulated time."""
     begin = board.control("cycles")["cycle"]
-    before, since = net(board), begin
+    before, since = net_steps(board), begin
     while True:
-        cycle, counts = board.control("cycles")["cycle"], net(board)
+        cycle, counts = board.control("cycles")["cycle"], net_steps(board)
         if counts != before:
             before, since = counts, cycle
         if cycle - since > 0.2 * CLOCK_HZ:

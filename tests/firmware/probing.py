@@ -11,18 +11,18 @@ PROBE = Path(__file__).with_name("probe.c")
 MS = 1e-3
 
 
-def stepped(probe: Path, board: str = "uno_cnc_shield", **options: object) -> EmulatedBoard:
+def stepped_board(probe: Path, board: str = "uno_cnc_shield", **options: object) -> EmulatedBoard:
     """In simulated time, with a trace."""
     return EmulatedBoard(board, elf=probe, speed="step", trace=True, **options)  # type: ignore[arg-type]
 
 
-def started(board: EmulatedBoard) -> EmulatedBoard:
+def start_probe(board: EmulatedBoard) -> EmulatedBoard:
     """Let the probe set up its UART."""
     board.run(2 * MS)
     return board
 
 
-def ask(port: serial.Serial, command: bytes) -> bytes:
+def ask_probe(port: serial.Serial, command: bytes) -> bytes:
     """The probe's answer to a letter, in real time."""
     port.write(command)
     return port.readline()

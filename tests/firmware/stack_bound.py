@@ -171,7 +171,7 @@ class Bound:
         return self.ram - self.variables - self.total
 
 
-def bound(elf: Path, ram: int) -> Bound:
+def stack_bound(elf: Path, ram: int) -> Bound:
     """Of main() and what it calls, and of the one interrupt that may come then."""
     program = Program(elf)
     main = program.deepest(program.symbol("main"))

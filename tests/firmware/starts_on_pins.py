@@ -9,15 +9,15 @@ from typing import Any
 
 import numpy as np
 from emulator import EmulatedBoard
-from pins import net
+from pins import net_steps
 
 import armkin
 from armkin.errors import NoSolutionError
 from command_line import THREE_DOF, run, run_patiently
-from starting_elsewhere import Result, judged
+from starting_elsewhere import Result, judge_motion
 
 
-def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Sequence[float]) -> Result:
+def send_path_from(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Sequence[float]) -> Result:
     """Put the arm into a place [deg], send the path from there, and read the pins while it moves.
 
     Raises NoSolutionError if it was refused, without a step.
@@ -29,20 +29,20 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
     assume = [] if any(axes[name]["positive"] or axes[name]["negative"] for name in "XYZ") else ["--assume-home"]
     placed = run_patiently("send", THREE_DOF, *place, "--port", board.port, *assume)
     assert placed.code == 0, placed.err
-    before, begin = net(board), 0
+    before, begin = net_steps(board), 0
 
     def noted(*words: object) -> Any:
         """The same command, where the motors stand before it: a busy machine may have held the arm on its way."""
         nonlocal before, begin
-        before, begin = net(board), board.control("cycles")["cycle"]
+        before, begin = net_steps(board), board.control("cycles")["cycle"]
         return run(*words)
 
     completed = run_patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
     if completed.code == 3:
-        assert net(board) == before
+        assert net_steps(board) == before
         raise NoSolutionError(completed.err.strip())
     assert completed.code == 0, completed.err
-    assert net(board) == completed.json["pulses"]
+    assert net_steps(board) == completed.json["pulses"]
     trace = board.trace()
     steps = [(when[when > begin], way[when > begin]) for when, way in map(trace.steps, "XYZ")]
     cycle = np.concatenate([when for when, _ in steps])
@@ -53,4 +53,4 @@ def sent(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Seque
         at += len(when)
     counts = before + np.cumsum(change[np.argsort(cycle, kind="stable")], axis=0)
     plan = armkin.path(arm, moves, start=armkin.joints(arm, before))
-    return judged(plan, np.vstack([before, counts, net(board)]).astype(float))
+    return judge_motion(plan, np.vstack([before, counts, net_steps(board)]).astype(float))

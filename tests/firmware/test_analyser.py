@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bare_host import WIDE, BareHost, Batch, batches, image_for
-from emulator import BUILD, FIRMWARE, PICO, EmulatedBoard, Trace, build_simulator, make
+from bare_host import WIDE, BareHost, Batch, cut_batches, image_for
+from emulator import BUILD, FIRMWARE, PICO, EmulatedBoard, Trace, build_simulator, run_make
 from measure import counts_at_home
-from measure_pico import ready
+from measure_pico import ready_host
 from numpy.typing import NDArray
 
 from armkin.board.firmware.wire.protocol import Segment, whole_steps
@@ -30,10 +30,10 @@ def there_and_back(axes: tuple[int, ...], slow: int, fast: int, ticks: int) -> l
         return whole_steps(n, interval, 0, tuple(way * (-1) ** k * n for k in range(len(axes))))
 
     work = [part(8, slow, 1), part(ticks, fast, 1), part(8, slow, 1), part(8, slow, -1)]
-    return batches(axes, (0,) * len(axes), work, 4)
+    return cut_batches(axes, (0,) * len(axes), work, 4)
 
 
-def uno() -> tuple[Trace, float]:
+def record_uno() -> tuple[Trace, float]:
     with EmulatedBoard("uno_cnc_shield", speed="step", trace=True) as board:
         host = BareHost(board)
         host.run(0.02)
@@ -42,9 +42,9 @@ def uno() -> tuple[Trace, float]:
         return board.trace(), 125 / 16
 
 
-def pico() -> tuple[Trace, float]:
+def record_pico() -> tuple[Trace, float]:
     with EmulatedBoard(PICO, speed="step", trace=True) as board:
-        host = ready(board, FAST)
+        host = ready_host(board, FAST)
         host.stream(there_and_back((0, 1, 2, 3, 4, 5), 1000, 100, 260))
         return board.trace(), 1.0
 
@@ -63,7 +63,7 @@ def waveform(trace: Trace, scale: float) -> list[list[int]]:
     return samples
 
 
-def levels(wave: list[list[int]], bit: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def edge_samples(wave: list[list[int]], bit: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """When a pin rises and falls."""
     samples, level = np.array(wave).T
     high = level >> bit & 1
@@ -82,10 +82,10 @@ def off_grid(rises: NDArray[np.int64]) -> float:
     return worst
 
 
-def expected(wave: list[list[int]], axis: int) -> dict[str, Any]:
+def expected_answer(wave: list[list[int]], axis: int) -> dict[str, Any]:
     """What the analyser should say of an axis, from the waveform's edges by sorting."""
-    rises, falls = levels(wave, axis)
-    turns = np.sort(np.concatenate(levels(wave, axis + 4)))
+    rises, falls = edge_samples(wave, axis)
+    turns = np.sort(np.concatenate(edge_samples(wave, axis + 4)))
     turns = turns[turns > 1]  # those before the first sample are not seen
     samples, level = np.array(wave).T
     back = (level[np.searchsorted(samples, rises, side="right") - 1] >> axis + 4) & 1
@@ -109,9 +109,9 @@ def expected(wave: list[list[int]], axis: int) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize("board", [uno, pico])
+@pytest.mark.parametrize("board", [record_uno, record_pico])
 def test_the_analyser_prints_what_the_emulated_pins_did(board: Any) -> None:
-    make("-C", str(FIRMWARE / "analyser"))
+    run_make("-C", str(FIRMWARE / "analyser"))
     build_simulator(PICO)  # the analyser runs in it, whichever board made the waveform
     wave = waveform(*board())
     command = ["node", str(Path(__file__).with_name("analyser_runner.mjs")), str(BUILD / "analyser.uf2")]
@@ -122,4 +122,4 @@ def test_the_analyser_prints_what_the_emulated_pins_did(board: Any) -> None:
     for axis, name in enumerate(SEEN):
         printed = table["axes"][name]
         assert printed.pop("steady_runs") >= 1
-        assert printed == pytest.approx(expected(wave, axis), abs=0.0081), name
+        assert printed == pytest.approx(expected_answer(wave, axis), abs=0.0081), name

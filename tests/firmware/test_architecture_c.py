@@ -24,7 +24,7 @@ C_LIBRARY = {"memcpy", "memset", "memcmp", "memmove"}
 HAL = re.compile(r"hal_\w+|dda_direction")  # what core/hal.h and chip.h ask of a chip
 
 
-def included(folder: Path) -> dict[str, set[str]]:
+def includes_of(folder: Path) -> dict[str, set[str]]:
     """What each module (X.h and X.c together, "core/motion") below a folder includes of the same folder."""
     includes: dict[str, set[str]] = {}
     for file in sorted([*folder.rglob("*.h"), *folder.rglob("*.c")]):
@@ -35,7 +35,7 @@ def included(folder: Path) -> dict[str, set[str]]:
     return {name: (uses & set(includes)) - {name} for name, uses in includes.items()}
 
 
-def called(objects: Iterable[Path]) -> tuple[dict[str, set[str]], set[str]]:
+def calls_of(objects: Iterable[Path]) -> tuple[dict[str, set[str]], set[str]]:
     """Which other object each one takes a function or a variable from; and the names that none of them defines."""
     defines: dict[str, str] = {}
     wants: dict[str, set[str]] = {}
@@ -51,7 +51,7 @@ def called(objects: Iterable[Path]) -> tuple[dict[str, set[str]], set[str]]:
     return uses, set().union(*wants.values()) - set(defines)
 
 
-def circle(uses: Mapping[str, set[str]]) -> list[str]:
+def circular_modules(uses: Mapping[str, set[str]]) -> list[str]:
     """Modules that reach themselves, and those above them; empty if there are none."""
     left = dict(uses)
     while left:
@@ -63,7 +63,7 @@ def circle(uses: Mapping[str, set[str]]) -> list[str]:
     return []
 
 
-def below(uses: Mapping[str, set[str]], name: str) -> set[str]:
+def all_below(uses: Mapping[str, set[str]], name: str) -> set[str]:
     """All that a module reaches."""
     reached, next_names = set[str](), {name}
     while next_names:
@@ -72,7 +72,7 @@ def below(uses: Mapping[str, set[str]], name: str) -> set[str]:
     return reached - {name}
 
 
-def compiled(room: str, sources: Iterable[Path], into: Path) -> list[Path]:
+def compile_objects(room: str, sources: Iterable[Path], into: Path) -> list[Path]:
     """One object a source, nothing inlined across them."""
     command = [*COMPILERS[room], "-std=gnu11", "-O1", "-c", *map(str, sources)]
     subprocess.run(command, cwd=into, check=True, capture_output=True)
@@ -83,48 +83,48 @@ def test_a_circle_is_found(tmp_path: Path) -> None:
     """Three files that include nothing but call each other in a round, by declarations of their own."""
     for name, callee in [("a", "b"), ("b", "c"), ("c", "a")]:
         (tmp_path / f"{name}.c").write_text(f"void {callee}(void); void {name}(void) {{ {callee}(); }}")
-    uses, missing = called(compiled("pc", sorted(tmp_path.glob("*.c")), tmp_path))
+    uses, missing = calls_of(compile_objects("pc", sorted(tmp_path.glob("*.c")), tmp_path))
     assert uses == {"a": {"b"}, "b": {"c"}, "c": {"a"}}
-    assert (circle(uses), missing) == (["a", "b", "c"], set())
-    assert circle(uses | {"c": set()}) == []
-    assert below(uses, "a") == {"b", "c"}
+    assert (circular_modules(uses), missing) == (["a", "b", "c"], set())
+    assert circular_modules(uses | {"c": set()}) == []
+    assert all_below(uses, "a") == {"b", "c"}
 
 
 @pytest.mark.parametrize("folder", ["src", "sim"])
 def test_no_module_includes_itself(folder: str) -> None:
-    assert circle(included(FIRMWARE / folder)) == []
+    assert circular_modules(includes_of(FIRMWARE / folder)) == []
 
 
 def test_no_module_of_the_core_calls_itself(tmp_path: Path) -> None:
-    uses, missing = called(compiled("pc", sorted((SOURCE / "core").glob("*.c")), tmp_path))
-    assert circle(uses) == []
+    uses, missing = calls_of(compile_objects("pc", sorted((SOURCE / "core").glob("*.c")), tmp_path))
+    assert circular_modules(uses) == []
     assert {name for name in missing if not HAL.fullmatch(name)} <= C_LIBRARY, "the core calls the chip by hal.h alone"
-    includes = included(SOURCE)
+    includes = includes_of(SOURCE)
     for module, used in uses.items():
-        assert {f"core/{callee}" for callee in used} <= below(includes, f"core/{module}"), module
+        assert {f"core/{callee}" for callee in used} <= all_below(includes, f"core/{module}"), module
 
 
 @pytest.mark.parametrize("room", ["avr", "rp2040"])
 def test_no_module_of_a_chip_calls_itself(room: str, tmp_path: Path) -> None:
-    uses, _ = called(compiled(room, sorted((SOURCE / room).glob("*.c")), tmp_path))
-    assert circle(uses) == []
+    uses, _ = calls_of(compile_objects(room, sorted((SOURCE / room).glob("*.c")), tmp_path))
+    assert circular_modules(uses) == []
 
 
 def test_no_module_of_the_emulator_calls_itself() -> None:
     build_simulator()
     sources = sorted((FIRMWARE / "sim").glob("*.c"))
-    uses, _ = called(BUILD / "sim" / f"{file.stem}.o" for file in sources)
-    assert circle(uses) == []
-    includes = included(FIRMWARE / "sim")
+    uses, _ = calls_of(BUILD / "sim" / f"{file.stem}.o" for file in sources)
+    assert circular_modules(uses) == []
+    includes = includes_of(FIRMWARE / "sim")
     for module, used in uses.items():
-        assert used <= below(includes, module), module
+        assert used <= all_below(includes, module), module
 
 
 def test_no_module_of_the_picos_emulator_imports_itself() -> None:
     files = sorted((FIRMWARE / "sim" / "rp2040").glob("*.mjs"))
     uses = {file.stem: set(IMPORT.findall(file.read_text())) for file in files}
     assert set().union(*uses.values()) == set(uses) - {"board"}, "every file is found, and board.mjs stands at the top"
-    assert circle(uses) == []
+    assert circular_modules(uses) == []
 
 
 def test_only_the_protocol_ends_sessions() -> None:

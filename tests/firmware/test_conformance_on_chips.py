@@ -22,4 +22,4 @@ def chip(request: pytest.FixtureRequest) -> Iterator[EmulatedBoard]:
 
 @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
 def test_the_firmware_conforms(chip: EmulatedBoard, case: Callable[..., None]) -> None:
-    case(emulated_chips.start(chip), 1 if chip.board == PICO else 2)
+    case(emulated_chips.starter_of(chip), 1 if chip.board == PICO else 2)

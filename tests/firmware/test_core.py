@@ -9,8 +9,8 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from emulator import BUILD, FIRMWARE, MCU, EmulatedBoard, build_firmware, make
-from golden import talks
+from emulator import BUILD, FIRMWARE, MCU, EmulatedBoard, build_firmware, run_make
+from golden import read_talks
 
 ARDUINO = Path("/usr/share/arduino/hardware/arduino/avr")  # Debian's arduino-core-avr
 FLASH, RAM = {"atmega328p": 32_256, "atmega2560": 253_952}, {"atmega328p": 2048, "atmega2560": 8192}
@@ -18,7 +18,7 @@ FLASH, RAM = {"atmega328p": 32_256, "atmega2560": 253_952}, {"atmega328p": 2048,
 
 def test_the_core_keeps_its_promises_under_sanitizers(sample: Callable[[int, int], int]) -> None:
     # unit tests, golden vectors; with --long a million random and a million damaged frames
-    make("-C", str(FIRMWARE), "check", f"FRAMES={sample(1_000_000, 60_000)}", f"LIVES={sample(1000, 100)}")
+    run_make("-C", str(FIRMWARE), "check", f"FRAMES={sample(1_000_000, 60_000)}", f"LIVES={sample(1000, 100)}")
 
 
 def test_random_lives_take_the_branches_of_what_guards_a_motion() -> None:
@@ -86,7 +86,7 @@ def test_the_arduino_ide_builds_the_same_firmware(tmp_path: Path) -> None:
     elf = build_like_the_ide(tmp_path, "atmega328p", "standard", "AVR_UNO")
     symbols = subprocess.run(["avr-nm", str(elf)], capture_output=True, text=True, check=True).stdout
     assert not re.search(r"\bmillis\b", symbols)  # nothing of the Arduino core, whose interrupts would shake the pulses
-    talk = next(t for t in talks() if t.name == "move.talk")
+    talk = next(t for t in read_talks() if t.name == "move.talk")
     with EmulatedBoard("uno_cnc_shield", speed="step", elf=elf) as board:
         assert talk.replay(board) > 10
 

@@ -24,19 +24,19 @@ def board() -> Iterator[EmulatedBoard]:
         yield emulated
 
 
-def ready(board: EmulatedBoard) -> BareHost:
+def ready_host(board: EmulatedBoard) -> BareHost:
     host = BareHost(board)
     host.setup(image_for("uno_cnc_shield", MODERATE), KNOWN)
     return host
 
 
-def move(host: BareHost, start: int, steps: int) -> None:
+def move_x(host: BareHost, start: int, steps: int) -> None:
     """X by `steps`, one a tick, as one segment: at 8,000 steps/s if it is long enough to begin so fast."""
     segment = whole_steps(abs(steps), 2000 if abs(steps) > 600 else 8000, 0, (steps,))
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
 
 
-def net(board: EmulatedBoard, axis: str = "X") -> int:
+def net_steps(board: EmulatedBoard, axis: str = "X") -> int:
     count: int = board.stats()["axes"][axis]["net"]
     return count
 
@@ -47,7 +47,7 @@ def net(board: EmulatedBoard, axis: str = "X") -> int:
 @pytest.mark.parametrize(("count", "bounce"), [(-3000, 0), (-777, 2), (40, 1)])
 def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, count: int, bounce: int) -> None:
     board.control(f"set-switch X at {count} below bounce {bounce}ms" if bounce else f"set-switch X at {count} below")
-    host = ready(board)
+    host = ready_host(board)
     rate = (-4000, 0, 0, 0, 0)
     host.order(protocol.home(0, switch=0, closed=False, slow=26, backoff=300, travel=8000, time=200, rate=rate))
     assert host.status().known == 0b11110
@@ -56,20 +56,20 @@ def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, count: int,
     latch = host.status(page=1).counts[0]
     # 1 ms of bouncing at 406 steps/s is within half a step
     assert abs(latch - count) <= (1 if bounce else 0)
-    assert status.counts[0] == net(board)
+    assert status.counts[0] == net_steps(board)
     host.order(protocol.set_position(0, {0: status.counts[0] - latch - 5000}))
     assert host.status().known == 0b11111
     assert board.stats()["memory"]["stack_never_touched"] >= 128
 
 
 def test_homing_gives_up_after_its_travel(board: EmulatedBoard) -> None:
-    host = ready(board)
+    host = ready_host(board)
     rate = (-4000, 0, 0, 0, 0)
     host.order(protocol.home(0, switch=0, closed=False, slow=26, backoff=300, travel=3000, time=200, rate=rate))
     status = host.rest()
     assert status.error == Error.TRAVEL
     assert not status.known & 1
-    assert -4000 < net(board) <= -3000
+    assert -4000 < net_steps(board) <= -3000
 
 
 # Resets, power, cables
@@ -78,8 +78,8 @@ def test_homing_gives_up_after_its_travel(board: EmulatedBoard) -> None:
 @pytest.mark.parametrize("cause", ["external", "watchdog", "power", "brownout"])
 @pytest.mark.parametrize("moving", [False, True])
 def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: str, moving: bool) -> None:
-    host = ready(board)
-    move(host, 0, 2000)
+    host = ready_host(board)
+    move_x(host, 0, 2000)
     host.run(0.1 if moving else 0.5)
     board.control(f"reset {cause}")
     host.run(0.05)
@@ -89,19 +89,19 @@ def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: st
         assert info.known == 0b01111  # nothing holds a servo without pulses
         assert info.flags == Flag.DRIVERS | Flag.CONFIGURED | Flag.RETAINED
         assert info.boots == 2
-        assert host.status().counts[0] == net(board) == 2000
+        assert host.status().counts[0] == net_steps(board) == 2000
     else:
         assert (info.known, info.config) == (0, 0)
-    stood = net(board)
+    stood = net_steps(board)
     host.run(0.5)
-    assert net(board) == stood
+    assert net_steps(board) == stood
 
 
 def test_a_bootloader_that_hides_the_cause_leaves_the_position() -> None:
     with EmulatedBoard("uno_cnc_shield", speed="step", bootloader=20) as board:
         board.run(0.05)
-        host = ready(board)
-        move(host, 0, 500)
+        host = ready_host(board)
+        move_x(host, 0, 500)
         host.run(0.3)
         board.control("reset external")
         host.run(0.1)
@@ -111,8 +111,8 @@ def test_a_bootloader_that_hides_the_cause_leaves_the_position() -> None:
 
 
 def test_a_cut_data_line_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None:
-    host = ready(board)
-    move(host, 0, 20_000)
+    host = ready_host(board)
+    move_x(host, 0, 20_000)
     host.run(0.2)
     board.control("cut both")
     for _ in range(10):
@@ -120,24 +120,24 @@ def test_a_cut_data_line_is_a_hold_with_exact_counts(board: EmulatedBoard) -> No
     board.control("restore")
     status = host.status()
     assert (status.state, status.error, status.known) == (State.IDLE, Error.SILENCE, 0b11111)
-    assert status.counts[0] == net(board)
+    assert status.counts[0] == net_steps(board)
     # half a second of silence after the last frame, then a ramp of u = 8000/160000 s
     assert status.counts[0] == pytest.approx(8000 * (0.5 + 0.05 / 2), rel=0.02)
     host.hello(2)
-    move(host, status.counts[0], -100)
+    move_x(host, status.counts[0], -100)
     assert host.rest().counts[0] == status.counts[0] - 100
 
 
 def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
-    host = ready(board)
-    move(host, 0, 20_000)
+    host = ready_host(board)
+    move_x(host, 0, 20_000)
     host.run(0.2)
     board.control("pin A0 0")
     host.run(0.4)
     status = host.status()
     assert (status.state, status.error) == (State.IDLE, Error.ABORT)
     assert status.flags & Flag.ABORT
-    assert status.counts[0] == net(board)
+    assert status.counts[0] == net_steps(board)
     assert status.known == 0b11111
     host.hello(2)
     refused = host.ask(protocol.jog(0, (100, 0, 0, 0, 0)), protocol.Ack)
@@ -145,7 +145,7 @@ def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
     board.control("pin A0 z")
     host.run(0.02)
     host.hello(3)
-    move(host, status.counts[0], 100)
+    move_x(host, status.counts[0], 100)
     assert host.rest().counts[0] == status.counts[0] + 100
 
 
@@ -171,18 +171,18 @@ def test_every_question_of_many_at_once_is_answered_or_told_lost(board: Emulated
 
 
 def test_jog_stops_when_the_host_falls_silent(board: EmulatedBoard) -> None:
-    host = ready(board)
+    host = ready_host(board)
     for _ in range(5):
         host.order(protocol.jog(0, (4000, -2000, 0, 0, 0)))
         host.run(0.08)
     assert host.status().state == State.JOGGING
-    begin = net(board)
+    begin = net_steps(board)
     host.run(0.5)
     status = host.status()
     assert (status.state, status.error) == (State.IDLE, 0)
     # 250 ms of dead-man, 24 ms of queue, 25 ms of ramp
-    assert 4000 * 0.1 < net(board) - begin < 4000 * 0.4
-    assert status.counts[:2] == (net(board), net(board, "Y"))
+    assert 4000 * 0.1 < net_steps(board) - begin < 4000 * 0.4
+    assert status.counts[:2] == (net_steps(board), net_steps(board, "Y"))
     assert abs(status.counts[0] + 2 * status.counts[1]) <= 2
 
 

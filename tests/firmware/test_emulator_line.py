@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import serial
 from emulator import CLOCK_HZ, EmulatedBoard, compile_program
-from probing import MS, PROBE, ask, started, stepped
+from probing import MS, PROBE, ask_probe, start_probe, stepped_board
 
 
 def test_bytes_take_ten_bits_in_both_directions(probe: Path, programs: Path) -> None:
@@ -17,8 +17,8 @@ def test_bytes_take_ten_bits_in_both_directions(probe: Path, programs: Path) -> 
     slow = slow.rename(programs / "slow.elf")
     compile_program(PROBE, "uno_cnc_shield", programs)
     for elf, host, device in ((probe, 640.0, 640.0), (slow, 16e6 / 11520, 17 * 8 * 10)):
-        with stepped(elf) as board:
-            started(board)
+        with stepped_board(elf) as board:
+            start_probe(board)
             sent = bytes(range(32, 132))
             assert board.run(30 * MS, b"e" + sent) == sent
             arrived, value = board.trace().edges("uart.in")
@@ -30,8 +30,8 @@ def test_bytes_take_ten_bits_in_both_directions(probe: Path, programs: Path) -> 
 
 
 def test_a_program_that_does_not_read_overruns(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         answers = board.run(20 * MS, b"s" + b"x" * 100)  # 2 ms, 50 bytes without interrupts
         uart = board.stats()["uart"]
         assert answers.count(b"?") == 100 - uart["overruns"]
@@ -41,8 +41,8 @@ def test_a_program_that_does_not_read_overruns(probe: Path) -> None:
 
 
 def test_the_wrong_baud_rate_garbles(probe: Path) -> None:
-    with stepped(probe, baud=115200) as board:
-        started(board)
+    with stepped_board(probe, baud=115200) as board:
+        start_probe(board)
         assert b"\n" not in board.run(20 * MS, b"r")
         assert board.stats()["uart"]["garbled"] == 1
         board.control("baud auto")
@@ -50,8 +50,8 @@ def test_the_wrong_baud_rate_garbles(probe: Path) -> None:
 
 
 def test_run_stops_at_a_byte(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         assert board.run(1, b"r", until=b" ") == b"01 "
         assert board.stats()["seconds"] < 5 * MS
         assert board.run(1 * MS) == b"0001 1\n"
@@ -61,8 +61,8 @@ def test_noise_has_its_rate_and_repeats_with_its_seed(probe: Path) -> None:
     sent = bytes(range(32, 232)) * 100
 
     def noisy(seed: int, way: str) -> tuple[bytes, dict[str, dict[str, int]]]:
-        with stepped(probe) as board:
-            started(board).run(1 * MS, b"e")
+        with stepped_board(probe) as board:
+            start_probe(board).run(1 * MS, b"e")
             board.control(f"noise flip 0.01 drop 0.02 seed {seed} dir {way}")
             received = board.run(0.85, sent)
             line: dict[str, dict[str, int]] = board.stats()["line"]
@@ -83,8 +83,8 @@ def test_noise_has_its_rate_and_repeats_with_its_seed(probe: Path) -> None:
 
 
 def test_a_cut_line_carries_nothing(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board).run(1 * MS, b"e")
+    with stepped_board(probe) as board:
+        start_probe(board).run(1 * MS, b"e")
         board.control("cut out")
         assert board.run(5 * MS, b"abc") == b""
         board.control("restore")
@@ -102,8 +102,8 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
         for boots in (2, 3, 4):  # power-on was the first
             with serial.Serial(board.port, 250000, timeout=60) as port:
                 board.wait(2 * MS)
-                assert ask(port, b"r") == b"02 %04x 0\n" % boots
-                assert ask(port, b"p\x64") == b"\n"
+                assert ask_probe(port, b"r") == b"02 %04x 0\n" % boots
+                assert ask_probe(port, b"p\x64") == b"\n"
         assert board.net()["X"] == 300
         for _ in range(5):  # faster than the emulator looks
             os.close(os.open(board.port, os.O_RDWR | os.O_NOCTTY))
@@ -113,7 +113,7 @@ def test_the_port_is_a_serial_port_and_opening_it_resets(probe: Path) -> None:
         with serial.Serial(board.port, 250000, timeout=60) as port:
             assert board.stats()["resets"] == 9
             with serial.Serial(board.port, 250000, timeout=60):
-                assert ask(port, b"p\x01") == b"\n"
+                assert ask_probe(port, b"p\x01") == b"\n"
             assert board.stats()["resets"] == 9
         path = Path(board.port)
     assert not path.parent.exists()
@@ -151,7 +151,7 @@ def test_the_clock_follows_real_time_or_the_host(probe: Path) -> None:
     with EmulatedBoard(elf=probe, speed="max", ahead_ms=2000) as board:
         with serial.Serial(board.port, 250000, timeout=60) as port:
             board.wait(2 * MS)
-            assert ask(port, b"r").startswith(b"02 ")
+            assert ask_probe(port, b"r").startswith(b"02 ")
             waited = board.stats()["pace"]["waited_ms"]
             board.wait(0.5)
             assert board.stats()["pace"]["waited_ms"] == waited  # free, as the host has just spoken
@@ -160,8 +160,8 @@ def test_the_clock_follows_real_time_or_the_host(probe: Path) -> None:
 
 
 def test_commands_wait_for_their_time(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         board.control("after 5ms reset external")
         board.control("after 2ms mark 7")
         begin = board.control("cycles")["cycle"]

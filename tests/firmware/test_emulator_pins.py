@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emulator import CLOCK_HZ, compile_program
-from probing import MS, PROBE, started, stepped
+from probing import MS, PROBE, start_probe, stepped_board
 
 
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "mega_ramps14"])
 def test_a_pulse_train_is_recorded_to_the_cycle(programs: Path, kind: str) -> None:
-    with stepped(compile_program(PROBE, kind, programs), kind) as board:
-        started(board)
+    with stepped_board(compile_program(PROBE, kind, programs), kind) as board:
+        start_probe(board)
         assert board.run(10 * MS, b"p\xc8") == b"\n"
         assert board.run(10 * MS, b"n\x07") == b"\n"
         x = board.stats()["axes"]["X"]
@@ -33,8 +33,8 @@ def test_a_pulse_train_is_recorded_to_the_cycle(programs: Path, kind: str) -> No
 
 
 def test_timer_interrupts_come_on_time_and_pay_their_entry(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         board.run(10 * MS, b"t\xc8")
         cycle, _ = board.trace().steps("Y")
         assert len(cycle) == 200
@@ -52,8 +52,8 @@ def test_timer_interrupts_come_on_time_and_pay_their_entry(probe: Path) -> None:
 
 
 def test_an_old_flag_fires_when_its_interrupt_is_enabled(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board).run(10 * MS, b"f")
+    with stepped_board(probe) as board:
+        start_probe(board).run(10 * MS, b"f")
         (step,) = board.trace().rises("Y.STEP")
         (marked,) = board.trace().rises("X.DIR")
         assert 5 < step - marked < 30  # not at the next compare, 640 cycles on
@@ -61,7 +61,7 @@ def test_an_old_flag_fires_when_its_interrupt_is_enabled(probe: Path) -> None:
 
 def test_timing_that_a_driver_would_miss_is_counted(probe: Path) -> None:
     def violations(driver: str, wait: float) -> dict[str, int]:
-        with stepped(probe, driver=driver) as board:
+        with stepped_board(probe, driver=driver) as board:
             board.run(wait)
             board.run(10 * MS, b"p\x05n\x05")
             counts: dict[str, int] = board.stats()["axes"]["X"]["violations"]
@@ -74,24 +74,24 @@ def test_timing_that_a_driver_would_miss_is_counted(probe: Path) -> None:
 
 
 def test_a_step_against_a_disabled_driver_is_counted(programs: Path) -> None:
-    with stepped(compile_program(PROBE, "mega_ramps14", programs), "mega_ramps14") as board:
-        started(board).run(10 * MS, b"t\x09")  # the probe enables X only
+    with stepped_board(compile_program(PROBE, "mega_ramps14", programs), "mega_ramps14") as board:
+        start_probe(board).run(10 * MS, b"t\x09")  # the probe enables X only
         axes = board.stats()["axes"]
         assert (axes["Y"]["violations"]["disabled"], axes["Y"]["enabled"]) == (9, False)
         assert axes["X"]["enabled"]
 
 
 def test_servo_pulses_are_measured(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         for _ in range(3):
             board.run(20 * MS, b"g")
         servo = board.stats()["servos"]["A3"]
         assert servo["pulses"] == 3
         assert servo["width_us"] == pytest.approx(1500, abs=1)
         assert servo["period_min_us"] == pytest.approx(20_000, abs=10)
-    with stepped(probe, "uno_servos") as board:
-        started(board).run(10 * MS, b"p\x0a")  # D2, the shield's X STEP, is a servo here
+    with stepped_board(probe, "uno_servos") as board:
+        start_probe(board).run(10 * MS, b"p\x0a")  # D2, the shield's X STEP, is a servo here
         assert board.stats()["servos"]["D2"]["width_max_us"] == 2.0
         assert board.stats()["axes"] == {}
 
@@ -99,21 +99,21 @@ def test_servo_pulses_are_measured(probe: Path) -> None:
 @pytest.mark.parametrize("kind", ["uno_cnc_shield", "mega_ramps14"])
 def test_pins_are_driven_and_released(programs: Path, kind: str) -> None:
     abort = "A3" if kind == "mega_ramps14" else "A0"
-    with stepped(compile_program(PROBE, kind, programs), kind, commands=(f"pin {abort} 0",)) as board:
-        started(board)
+    with stepped_board(compile_program(PROBE, kind, programs), kind, commands=(f"pin {abort} 0",)) as board:
+        start_probe(board)
         assert board.run(5 * MS, b"l") == b"1110\n"
         board.control(f"pin {abort} z")
         board.control("switch Y 1")
         assert board.run(5 * MS, b"l") == b"1011\n"
         board.control("reset external")  # drives outlast a reset
-        assert started(board).run(5 * MS, b"l") == b"1011\n"
+        assert start_probe(board).run(5 * MS, b"l") == b"1011\n"
         board.control("switch Y 0")
         assert board.run(5 * MS, b"l") == b"1111\n"
 
 
 def test_an_axis_runs_into_its_limit_switch(probe: Path) -> None:
-    with stepped(probe, commands=("set-switch X at -5 below", "set-switch Z at -100 below nc")) as board:
-        started(board)
+    with stepped_board(probe, commands=("set-switch X at -5 below", "set-switch Z at -100 below nc")) as board:
+        start_probe(board)
         assert board.run(5 * MS, b"l") == b"1101\n"  # the normally closed one reads low
         board.run(5 * MS, b"n\x04")
         assert board.run(5 * MS, b"l") == b"1101\n"
@@ -128,8 +128,8 @@ def test_an_axis_runs_into_its_limit_switch(probe: Path) -> None:
 
 
 def test_a_switch_bounces_and_settles(probe: Path) -> None:
-    with stepped(probe, commands=("set-switch X at 1 above bounce 3ms",)) as board:
-        started(board)
+    with stepped_board(probe, commands=("set-switch X at 1 above bounce 3ms",)) as board:
+        start_probe(board)
         board.run(10 * MS, b"p\x01")
         trace = board.trace()
         contact = 128 + 8 + 1  # PB1

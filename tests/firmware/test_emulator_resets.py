@@ -15,12 +15,12 @@ from typing import Any
 import pytest
 import serial
 from emulator import CLOCK_HZ, BoardError, build_simulator, compile_program
-from probing import MS, PROBE, ask, started, stepped
+from probing import MS, PROBE, ask_probe, start_probe, stepped_board
 
 
 def test_resets_set_their_flag_and_only_power_clears_memory(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         assert board.run(5 * MS, b"r") == b"01 0001 1\n"
         for kind, answer in (
             ("external", b"02 0002 0\n"),
@@ -30,7 +30,7 @@ def test_resets_set_their_flag_and_only_power_clears_memory(probe: Path) -> None
             ("power", b"01 0001 1\n"),
         ):
             board.control(f"reset {kind}")
-            started(board)
+            start_probe(board)
             assert board.run(5 * MS, b"r") == answer, kind
         assert board.run(100 * MS, b"w") == b""  # it hangs until the watchdog bites
         assert board.run(5 * MS, b"r") == b"08 0002 0\n"
@@ -41,15 +41,15 @@ def test_resets_set_their_flag_and_only_power_clears_memory(probe: Path) -> None
 def test_a_watchdog_that_is_not_turned_off_resets_for_ever(programs: Path) -> None:
     folder = programs / "forgetful"
     folder.mkdir()
-    with stepped(compile_program(PROBE, "uno_cnc_shield", folder, "-DFORGETFUL")) as board:
-        started(board)
+    with stepped_board(compile_program(PROBE, "uno_cnc_shield", folder, "-DFORGETFUL")) as board:
+        start_probe(board)
         board.run(200 * MS, b"w")
         assert board.stats()["resets"] > 8
 
 
 def test_a_bootloader_hides_the_cause_and_swallows_bytes(probe: Path) -> None:
-    with stepped(probe, bootloader=300) as board:
-        started(board)
+    with stepped_board(probe, bootloader=300) as board:
+        start_probe(board)
         assert board.run(5 * MS, b"r") == b"00 0001 1\n"
         board.control("reset external")
         assert board.run(290 * MS, b"r") == b""
@@ -60,17 +60,17 @@ def test_a_bootloader_hides_the_cause_and_swallows_bytes(probe: Path) -> None:
 
 
 def test_the_eeprom_outlasts_every_reset(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         assert board.run(20 * MS, b"v\xa7") == b"\n"
         for kind in ("external", "power", "watchdog"):
             board.control(f"reset {kind}")
-            assert started(board).run(20 * MS, b"V") == b"a7\n"
+            assert start_probe(board).run(20 * MS, b"V") == b"a7\n"
 
 
 def test_memory_figures_and_access_by_name(probe: Path) -> None:
-    with stepped(probe) as board:
-        started(board)
+    with stepped_board(probe) as board:
+        start_probe(board)
         before = board.stats()["memory"]
         assert before["ram"] == 2048
         assert 900 < before["flash"] < 2000
@@ -81,11 +81,11 @@ def test_memory_figures_and_access_by_name(probe: Path) -> None:
         assert board.control("peek survivor 2")["bytes"] == "3412"
         assert board.run(5 * MS, b"r") == b"01 1234 1\n"
         board.control("reset external")
-        assert started(board).run(5 * MS, b"r") == b"02 0001 1\n"  # its checksum does not fit
+        assert start_probe(board).run(5 * MS, b"r") == b"02 0001 1\n"  # its checksum does not fit
 
 
 def test_mistakes_are_answered(probe: Path, tmp_path: Path) -> None:
-    with stepped(probe) as board:
+    with stepped_board(probe) as board:
         for command, part in (
             ("jump", "no command 'jump'"),
             ("pin A9 0", "no pin 'A9'"),
@@ -105,20 +105,20 @@ def test_mistakes_are_answered(probe: Path, tmp_path: Path) -> None:
     wrong = tmp_path / "wrong.elf"
     wrong.write_bytes(b"no program")
     with pytest.raises(BoardError, match="exit code 2"):
-        stepped(wrong).__enter__()
+        stepped_board(wrong).__enter__()
 
 
 def test_a_crash_is_told(programs: Path) -> None:
     source = programs / "crash.c"
     source.write_text('int main(void) { for (;;) __asm__ volatile(".word 0x0001"); }\n')
-    with stepped(compile_program(source, "uno_cnc_shield", programs)) as board:
+    with stepped_board(compile_program(source, "uno_cnc_shield", programs)) as board:
         board.run(5 * MS)
         assert board.stats()["state"] == "crashed"
         assert board.run(5 * MS, b"x") == b""
 
 
 def test_nothing_is_left_behind_when_a_test_fails(probe: Path) -> None:
-    board = stepped(probe)
+    board = stepped_board(probe)
 
     def failing() -> None:
         with board:
@@ -159,7 +159,7 @@ def test_it_runs_for_people_too(probe: Path, tmp_path: Path) -> None:
                 ready = say("cycles")["cycle"] + 5 * MS * CLOCK_HZ
                 while say("cycles")["cycle"] < ready:
                     time.sleep(0.01)
-                assert ask(port, b"l") == b"1110\n"
+                assert ask_probe(port, b"l") == b"1110\n"
             for sent, good in (("pin A0 z", True), ("pin A0 2", False)):
                 assert ("ok" in say(sent)) is good
         process.send_signal(signal.SIGINT)

@@ -12,7 +12,7 @@ from emulator import EmulatedBoard
 
 import armkin
 from command_line import ROOT, run
-from person import ENTER, Person, seen
+from person import ENTER, Person, keys_for_direction
 
 
 def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
@@ -21,7 +21,7 @@ def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
     path = tmp_path / "mine.yaml"
     shutil.copy(ROOT / "robots/three_dof.yaml", path)
     path.chmod(0o644)
-    keys = [*seen("y"), *seen("n"), *seen("y")]  # directions
+    keys = [*keys_for_direction("y"), *keys_for_direction("n"), *keys_for_direction("y")]  # directions
     keys += ["2", "-", ENTER]  # zeros: the second joint is taken back a little
     keys += [ENTER, "y", "y", "y"]  # limits; the first move; check; write
     person = Person(keys, looks=20)

@@ -2,17 +2,17 @@
 
 import pytest
 from emulator import FIRMWARE, EmulatedBoard
-from golden import Talk, talks
+from golden import Talk, read_talks
 
 
-@pytest.mark.parametrize("talk", talks(), ids=lambda talk: talk.name)
+@pytest.mark.parametrize("talk", read_talks(), ids=lambda talk: talk.name)
 def test_the_firmware_answers_as_written(talk: Talk) -> None:
     with EmulatedBoard(talk.board, speed="step") as board:
         assert talk.replay(board) >= 2
 
 
 def test_a_bootloader_that_hides_the_cause_changes_nothing() -> None:
-    talk = next(t for t in talks() if t.name == "servos.talk")
+    talk = next(t for t in read_talks() if t.name == "servos.talk")
     with EmulatedBoard(talk.board, speed="step", bootloader=0.01) as board:
         assert talk.replay(board) > 10
 

@@ -20,7 +20,7 @@ ROBOTS = HERE.parents[1] / "robots"
 QUESTIONS = 6
 
 
-def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict[str, int]]:
+def build_program(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict[str, int]]:
     """The program with the solver of an arm, and bytes: flash and RAM of the solver's own object and of the whole."""
     texts, prefix = program(arm, "arm.c", None, single=True), identifier(arm.name)
     (folder / "arm.c").write_text(texts.source)
@@ -39,18 +39,18 @@ def built(arm: armkin.Arm, target: np.ndarray, folder: Path) -> tuple[Path, dict
     subprocess.run([*common, "-c", folder / "arm.c", "-o", folder / "arm.o"], check=True)
     words = [*common, *defines, "-Wl,--gc-sections", HERE / "ik_on_uno.c", folder / "arm.o", "-lm"]
     subprocess.run([*map(str, words), "-o", str(folder / "ik.elf")], check=True)
-    return folder / "ik.elf", sizes(folder / "arm.o", "solver") | sizes(folder / "ik.elf", "program")
+    return folder / "ik.elf", section_sizes(folder / "arm.o", "solver") | section_sizes(folder / "ik.elf", "program")
 
 
-def sizes(path: Path, name: str) -> dict[str, int]:
+def section_sizes(path: Path, name: str) -> dict[str, int]:
     listing = subprocess.run(["avr-size", path], capture_output=True, text=True, check=True).stdout
     code, data, bss = map(int, re.findall(r"\d+", listing.splitlines()[1])[:3])
     return {f"{name}_flash": code + data, f"{name}_ram": data + bss}
 
 
-def answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, Any]:
+def chip_answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, Any]:
     """What the chip says: found (QUESTIONS, branches, n) and its counts, cycles, bytes."""
-    elf, told = built(arm, target, folder)
+    elf, told = build_program(arm, target, folder)
     count, branches = len(target), armkin.ik(arm, target).q.shape[1]
     with EmulatedBoard("uno_cnc_shield", speed="step", elf=elf) as board:
 
@@ -77,7 +77,7 @@ def answers(arm: armkin.Arm, target: np.ndarray, folder: Path) -> dict[str, Any]
         }
 
 
-def questions(arm: armkin.Arm) -> np.ndarray:
+def regular_targets(arm: armkin.Arm) -> np.ndarray:
     """Positions with all their branches, far from singular postures."""
     rng = np.random.default_rng(8)
     T = armkin.fk(arm, rng.uniform([-1, -1, -2.4], [1, 1, -0.4], (200, 3)))
@@ -89,12 +89,12 @@ def questions(arm: armkin.Arm) -> np.ndarray:
 @pytest.fixture(scope="module")
 def on_uno(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
-    return answers(arm, questions(arm), tmp_path_factory.mktemp("uno"))
+    return chip_answers(arm, regular_targets(arm), tmp_path_factory.mktemp("uno"))
 
 
 def test_an_uno_finds_the_branches_of_python(on_uno: dict[str, Any]) -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
-    solutions = armkin.ik(arm, questions(arm))
+    solutions = armkin.ik(arm, regular_targets(arm))
     np.testing.assert_array_equal(on_uno["counts"], solutions.valid.sum(axis=1))
     np.testing.assert_allclose(on_uno["q"], solutions.q, atol=2e-5)
 

@@ -25,7 +25,7 @@ LOADS = {"quiet": 0.0, "busy": 3.0}
 WAY = [[100, 60, -90], [-100, 10, -20]]  # deg; 5.7 s
 
 
-def seconds(computer: str, *line: str) -> float:
+def send_seconds(computer: str, *line: str) -> float:
     """How long the way takes, what is done to the line included; the counts are checked, and the pins."""
     with EmulatedBoard(speed="step", reset_on_open=False) as board, pytest.MonkeyPatch.context() as patch:
         patch.setattr(streaming, "_processor_load", lambda _: LOADS[computer])
@@ -50,9 +50,9 @@ def seconds(computer: str, *line: str) -> float:
 
 
 @cache
-def clean(computer: str) -> float:
+def clean_seconds(computer: str) -> float:
     """The same over a good line."""
-    return seconds(computer)
+    return send_seconds(computer)
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,9 @@ def test_noise_costs_a_twentieth_and_ends_at_exact_counts(
 ) -> None:
     """The quiet ones of 1 % are held on their first degree, and gone on with. Of 24 seeds the worst takes 1.041."""
     sampled = noises[: sample(4, 2)]
-    took = np.array([seconds(computer, f"noise flip {rate} seed {seed}") for rate, seed in sampled]) / clean(computer)
+    took = np.array(
+        [send_seconds(computer, f"noise flip {rate} seed {seed}") for rate, seed in sampled]
+    ) / clean_seconds(computer)
     assert took.max() < 1.05
 
 
@@ -73,4 +75,4 @@ def test_a_line_that_is_dead_now_and_then_is_bridged(computer: str) -> None:
     dead = [
         f"after {ms + more}ms {event}" for ms in (1700, 4700) for more, event in ((0, "cut both"), (200, "restore"))
     ]
-    assert seconds(computer, *dead) < 1.05 * clean(computer)
+    assert send_seconds(computer, *dead) < 1.05 * clean_seconds(computer)

@@ -13,9 +13,9 @@ import curve_on_pins
 import numpy as np
 import pytest
 import waypoints_on_pins
-from bare_host import WIDE, BareHost, batches, image_for
+from bare_host import WIDE, BareHost, cut_batches, image_for
 from emulator import EmulatedBoard
-from pins import net
+from pins import net_steps
 
 import armkin
 from armkin.board.firmware.wire import protocol
@@ -38,7 +38,7 @@ def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: Emul
     completed = run_patiently("path", THREE_DOF, path, "--port", board.port, "--assume-home", "--json")
     assert completed.code == 0, completed.err
     arm = armkin.load(THREE_DOF)
-    counts = net(board)
+    counts = net_steps(board)
     assert counts == completed.json["pulses"]
     assert completed.json["segments"] < 100 * completed.json["duration_s"]
     assert off_the_circle(arm, counts) < 0.3
@@ -49,7 +49,7 @@ def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: Emul
     command = [sys.executable, "-m", "armkin", "path", THREE_DOF, str(path), "--port", board.port]
     sender = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     end = time.monotonic() + 60
-    while net(board)[0] > counts[0] - 120:
+    while net_steps(board)[0] > counts[0] - 120:
         assert sender.poll() is None, sender.communicate()
         assert time.monotonic() < end, "it does not move"
         time.sleep(0.01)
@@ -58,16 +58,16 @@ def test_a_closed_circle_ends_at_exact_counts_and_a_hold_stays_on_it(board: Emul
     assert sender.returncode == 130, err
     held = run("status", THREE_DOF, "--port", board.port, "--json").json
     assert held["position"] in ("known", "retained")
-    assert held["pulses"] == net(board)
-    assert off_the_circle(arm, net(board)) < 0.05 + 0.14 + 0.2
+    assert held["pulses"] == net_steps(board)
+    assert off_the_circle(arm, net_steps(board)) < 0.05 + 0.14 + 0.2
     back = run_patiently("path", THREE_DOF, path, "--port", board.port, "--json")
     assert back.code == 0, back.err
-    assert net(board) == counts
+    assert net_steps(board) == counts
 
 
 @pytest.fixture(scope="module")
 def circle() -> curve_on_pins.Laid:
-    return curve_on_pins.lay(curve_on_pins.CIRCLE)
+    return curve_on_pins.lay_curve(curve_on_pins.CIRCLE)
 
 
 def test_every_step_of_a_curve_comes_when_the_protocol_says(circle: curve_on_pins.Laid) -> None:
@@ -89,9 +89,9 @@ def test_a_tick_behind_the_shortest_interval_is_not_early() -> None:
         host.run(0.02)
         host.setup(image_for("uno_cnc_shield", replace(WIDE, max_accel=1 << 23)), {0: 0, 1: 0, 2: 0})
         uno.control("clear")
-        status = host.stream(batches((0, 1, 2), (0, 0, 0), segments, 4))
+        status = host.stream(cut_batches((0, 1, 2), (0, 0, 0), segments, 4))
         assert (status.error, status.overruns) == (0, 0)
-        expected = curve_on_pins.predicted(segments, [0, 0, 0])
+        expected = curve_on_pins.predicted_steps(segments, [0, 0, 0])
         assert curve_on_pins.late_us(uno.trace(), expected) <= 5.0
 
 
@@ -99,7 +99,7 @@ def test_a_tick_behind_the_shortest_interval_is_not_early() -> None:
 def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
     circle: curve_on_pins.Laid, share: float, cable: bool
 ) -> None:
-    held = curve_on_pins.held(circle, share, cable=cable)
+    held = curve_on_pins.hold_curve(circle, share, cable=cable)
     assert held.known
     assert held.goes_on
     assert held.off_way_mm <= 0.05 + HALF_A_STEP
@@ -112,7 +112,7 @@ def test_a_curve_held_or_cut_off_stays_on_its_way_and_known(
 
 def test_waypoints_are_streamed_without_a_stop() -> None:
     # A frame carries 0.2 s of motion as a mean; every 0.04 s the board's time waits for a host without a processor.
-    streamed = waypoints_on_pins.stream(60, patience=0.04)
+    streamed = waypoints_on_pins.stream_waypoints(60, patience=0.04)
     assert streamed.good, streamed
     assert streamed.processor < streamed.seconds  # it keeps up, on a machine that has time for it
     assert streamed.waypoints == 60

@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import pytest
-from bare_host import WIDE, BareHost, Batch, batches, image_for
+from bare_host import WIDE, BareHost, Batch, cut_batches, image_for
 from emulator import BUILD, PICO, EmulatedBoard, build_firmware
-from golden import talks
-from measure_pico import CLOCK, KNOWN, SIX, net, ready, segments_per_second, stepping
+from golden import read_talks
+from measure_pico import CLOCK, KNOWN, SIX, measure_stepping, net_steps, ready_host, segments_per_second
 
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Error, Flag, State, whole_steps
@@ -28,7 +28,7 @@ def board() -> Iterator[EmulatedBoard]:
         yield emulated
 
 
-def move(host: BareHost, start: int, steps: int) -> None:
+def move_x(host: BareHost, start: int, steps: int) -> None:
     """X by `steps`, at 8,000 steps/s."""
     segment = whole_steps(abs(steps), CLOCK // 8000, 0, (steps,))
     host.order(Batch((0,), (start,), (segment,), at_rest=True).payload(0))
@@ -36,17 +36,17 @@ def move(host: BareHost, start: int, steps: int) -> None:
 
 def under_way(board: EmulatedBoard, *, power_sensed: bool = False) -> BareHost:
     """X has gone 0.2 of 2.5 s at 8,000 steps/s."""
-    host = ready(board, MODERATE, power_sensed=power_sensed)
-    move(host, 0, 20_000)
+    host = ready_host(board, MODERATE, power_sensed=power_sensed)
+    move_x(host, 0, 20_000)
     host.run(0.2)
     return host
 
 
-def ended(host: BareHost, error: Error, known: int) -> protocol.Status:
+def end_status(host: BareHost, error: Error, known: int) -> protocol.Status:
     """The motion was ended by an error; the board's count of X is that of the pins."""
     status = host.rest()
     assert (status.error, status.known) == (error, known)
-    assert status.counts[0] == net(host.board)[0]
+    assert status.counts[0] == net_steps(host.board)[0]
     return status
 
 
@@ -91,7 +91,7 @@ def test_it_fits_the_memory_with_room_for_the_stack() -> None:
 
 def test_six_axes_at_250_khz_and_every_edge_is_where_the_protocol_puts_it() -> None:
     """Also while every interrupt comes 0.48 us late, which another one of 60 cycles would make."""
-    measured = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.48)
+    measured = measure_stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.48)
     assert measured.exact
     assert (measured.rate, measured.off_us, measured.overruns, measured.violations) == (250_000, 0, 0, 0)
     assert measured.high_us == pytest.approx(1.92)
@@ -99,13 +99,13 @@ def test_six_axes_at_250_khz_and_every_edge_is_where_the_protocol_puts_it() -> N
 
 
 def test_interrupts_that_come_later_than_there_is_room_for_are_told() -> None:
-    late = stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.64)
+    late = measure_stepping(CLOCK // 250_000, ticks=1500, held_off_us=0.64)
     assert (late.exact, late.error) == (False, Error.OVERRUN)
 
 
 def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard) -> None:
     """Every segment turns every axis round, 100 cycles a tick (250 kHz), with the times of a DRV8825."""
-    host = ready(board, replace(WIDE, max_rate=250_000, max_accel=(1 << 24) - 1))
+    host = ready_host(board, replace(WIDE, max_rate=250_000, max_accel=(1 << 24) - 1))
     work = tuple(whole_steps(10, 100, 0, ((-1) ** n * 10,) * 6) for n in range(6))
     host.order(Batch(SIX, (0,) * 6, work, at_rest=True).payload(0))
     host.run(0.01)
@@ -122,7 +122,7 @@ def test_the_shortest_interval_leaves_the_driver_its_times(board: EmulatedBoard)
 def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: EmulatedBoard) -> None:
     board.control("set-switch C at 3000 above")
     guards = (*[protocol.GuardImage()] * 5, protocol.GuardImage(False, (0, 0, 0, 0, 0, 1, 0, 0)))
-    host = ready(board, MODERATE, guards=guards)
+    host = ready_host(board, MODERATE, guards=guards)
     segment = whole_steps(20_000, CLOCK // 8000, 0, (20_000,))
     host.order(Batch((5,), (0,), (segment,), at_rest=True).payload(0))
     host.run(0.3)
@@ -131,21 +131,21 @@ def test_a_limit_switch_stops_within_a_ramp_and_lets_the_axis_leave(board: Emula
     assert (status.error, status.detail, status.known) == (Error.LIMIT_SWITCH, 5, 0xFF)
     # 3 ms until it counts, then a ramp of 8000 / 160000 s
     assert 3000 + 8000 * 0.025 < status.counts[5] < 3000 + 8000 * (0.025 + 0.006)
-    assert status.counts[5] == net(board)[5]
+    assert status.counts[5] == net_steps(board)[5]
     host.hello(2)
     refused = host.ask(Batch((5,), (status.counts[5],), (segment,), at_rest=True).payload(0), protocol.Ack)
     assert refused.error == Error.LIMIT_SWITCH
     host.hello(3)
     away = whole_steps(500, CLOCK // 8000, 0, (-500,))
     host.order(Batch((5,), (status.counts[5],), (away,), at_rest=True).payload(0))
-    assert host.rest().counts[5] == status.counts[5] - 500 == net(board)[5]
+    assert host.rest().counts[5] == status.counts[5] - 500 == net_steps(board)[5]
 
 
 def test_the_abort_input_holds_and_forbids(board: EmulatedBoard) -> None:
     host = under_way(board)
     board.control("pin GP26 0")
     host.run(0.2)
-    status = ended(host, Error.ABORT, 0xFF)
+    status = end_status(host, Error.ABORT, 0xFF)
     assert status.flags & Flag.ABORT
     host.hello(2)
     assert host.ask(protocol.jog(0, (100, *[0] * 7)), protocol.Ack).error == Error.ABORT
@@ -160,7 +160,7 @@ def test_a_cut_of_the_motors_power_is_a_lost_position(board: EmulatedBoard) -> N
     host = under_way(board, power_sensed=True)
     board.control("pin GP27 0")
     host.run(0.2)
-    ended(host, Error.POWER, 0)
+    end_status(host, Error.POWER, 0)
 
 
 def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None:
@@ -170,7 +170,7 @@ def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None
     board.control("restore")
     status = host.status()
     assert (status.state, status.error, status.known) == (State.IDLE, Error.SILENCE, 0xFF)
-    assert status.counts[0] == net(board)[0] == pytest.approx(8000 * (0.5 + 0.05 / 2), rel=0.02)
+    assert status.counts[0] == net_steps(board)[0] == pytest.approx(8000 * (0.5 + 0.05 / 2), rel=0.02)
 
 
 # Homing, resets, servos
@@ -179,20 +179,20 @@ def test_a_silent_host_is_a_hold_with_exact_counts(board: EmulatedBoard) -> None
 @pytest.mark.parametrize("count", [-1000, 40])
 def test_homing_latches_the_switch_to_the_step(board: EmulatedBoard, count: int) -> None:
     board.control(f"set-switch B at {count} below")
-    host = ready(board, MODERATE)
+    host = ready_host(board, MODERATE)
     rate = (0, 0, 0, 0, -4000, 0, 0, 0)
     host.order(protocol.home(0, switch=4, closed=False, slow=26, backoff=100, travel=8000, time=200, rate=rate))
     status = host.rest()
     assert (status.error, bool(status.flags & Flag.LATCH)) == (0, True)
     assert host.status(page=1).counts[4] == count
-    assert status.counts[4] == net(board)[4]
+    assert status.counts[4] == net_steps(board)[4]
 
 
 @pytest.mark.parametrize("cause", ["external", "watchdog", "power"])
 @pytest.mark.parametrize("moving", [False, True])
 def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: str, moving: bool) -> None:
-    host = ready(board, MODERATE)
-    move(host, 0, 1000)
+    host = ready_host(board, MODERATE)
+    move_x(host, 0, 1000)
     host.run(0.05 if moving else 0.2)
     board.control(f"reset {cause}")
     host.run(0.02)
@@ -201,16 +201,16 @@ def test_only_a_reset_at_rest_keeps_the_position(board: EmulatedBoard, cause: st
     if not moving and cause != "power":
         assert (info.known, info.boots) == (0x3F, 2)  # nothing holds a servo without pulses
         assert info.flags == Flag.DRIVERS | Flag.CONFIGURED | Flag.RETAINED
-        assert host.status().counts[0] == net(board)[0] == 1000
+        assert host.status().counts[0] == net_steps(board)[0] == 1000
     else:
         assert (info.known, info.config) == (0, 0)
-    stood = net(board)
+    stood = net_steps(board)
     host.run(0.2)
-    assert net(board) == stood
+    assert net_steps(board) == stood
 
 
 def test_a_program_that_hangs_is_reset_by_the_watchdog(board: EmulatedBoard) -> None:
-    host = ready(board, MODERATE)
+    host = ready_host(board, MODERATE)
     board.control("hang")
     host.run(0.3)
     info = host.hello(2)
@@ -240,7 +240,7 @@ def test_servos_are_silent_until_consent_then_exact(board: EmulatedBoard) -> Non
 
 
 def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
-    host = ready(board, replace(WIDE, max_rate=20_000, max_accel=1_000_000))
+    host = ready_host(board, replace(WIDE, max_rate=20_000, max_accel=1_000_000))
     board.control("noise flip 0.01 drop 0.01 seed 5 dir both")
     share, segments = (3, -5, 2, 1, -1, 4), 60
     counts: tuple[int, ...] = (0,) * 6
@@ -253,10 +253,10 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
         work = [whole_steps(12, 25_000, 0, share)] * left
         remainder = tuple(e - a - left * s for e, a, s in zip(end, counts, share, strict=True))
         work += [whole_steps(20, 25_000, 0, remainder)] if any(remainder) else []
-        status = host.stream(batches(SIX, counts, work, 3), resend=0.012, slice_s=2e-3, window=3, poll=0.05)
+        status = host.stream(cut_batches(SIX, counts, work, 3), resend=0.012, slice_s=2e-3, window=3, poll=0.05)
         counts = status.counts[:6]
     board.control("restore")
-    assert counts == end == net(board)
+    assert counts == end == net_steps(board)
 
 
 # USB
@@ -264,7 +264,7 @@ def test_noise_moves_nothing_that_was_not_sent(board: EmulatedBoard) -> None:
 
 @pytest.mark.parametrize("name", ["move_pico6.talk", "refuse_pico6.talk"])
 def test_the_golden_conversations_over_usb(name: str) -> None:
-    talk = next(t for t in talks() if t.name == name)
+    talk = next(t for t in read_talks() if t.name == name)
     with EmulatedBoard(PICO, speed="step", link="usb") as board:
         board.run(0.05)  # until the host has set it up
         assert talk.replay(board) > 10
@@ -290,7 +290,7 @@ def test_a_tick_that_is_brought_too_late_is_told_and_ends_in_a_hold(board: Emula
     host = under_way(board)
     board.control("absent 200us")  # an edge is due every 125 us
     host.run(0.1)
-    status = ended(host, Error.OVERRUN, 0xFF)
+    status = end_status(host, Error.OVERRUN, 0xFF)
     assert 8000 * 0.2 < status.counts[0] < 8000 * 0.3
 
 

@@ -21,7 +21,7 @@ ARMS = {
 }
 
 
-def wire(board: EmulatedBoard, arm: armkin.Arm, edges: Sequence[int]) -> None:
+def wire_switches(board: EmulatedBoard, arm: armkin.Arm, edges: Sequence[int]) -> None:
     """Limit switches that close (open) after so many net steps."""
     for axis, switch, steps in zip("XYZABC", arm.homing, edges, strict=True):
         if switch is not None:
@@ -31,7 +31,7 @@ def wire(board: EmulatedBoard, arm: armkin.Arm, edges: Sequence[int]) -> None:
             board.control(f"set-switch {axis} at {steps} {'above' if above else 'below'} {contact}")
 
 
-def edges(arm: armkin.Arm) -> NDArray[np.int64]:
+def switch_pulses(arm: armkin.Arm) -> NDArray[np.int64]:
     """Pulses at the switches, from home; 0 where there is none."""
     switch_values = [
         np.radians(switch.at) if switch is not None else home for switch, home in zip(arm.homing, arm.home, strict=True)
@@ -51,7 +51,7 @@ def test_a_six_axis_arm_moves_end_to_end(name: str) -> None:
     rehearsed = run("send", robot, *pose, "--port", "sim", "--json")
     assert rehearsed.code == 0, rehearsed.err
     with EmulatedBoard(PICO, speed=0.4, trace=True, driver="tmc2209", link=link) as board:
-        wire(board, arm, edges(arm).tolist())
+        wire_switches(board, arm, switch_pulses(arm).tolist())
         sent = run("send", robot, *pose, "--port", board.port, "--assume-home", "--json")
         assert sent.code == 0, sent.err
         assert sent.json["pulses"] == rehearsed.json["pulses"] == planned.json["pulses"]
@@ -93,13 +93,13 @@ def finds_its_switches(name: str, joints: range, monkeypatch: pytest.MonkeyPatch
     step = np.radians([switch.direction for switch in arm.homing if switch is not None])
     away = armkin.pulses(arm, arm.home + step)
     with EmulatedBoard(PICO) as board:
-        wire(board, arm, away.tolist())
+        wire_switches(board, arm, away.tolist())
         assert run("send", robot, "home", "--port", board.port, "--assume-home").code == 0
         names = [arm.joint_names[j] for j in joints]
         completed = run("home", robot, *names, "--port", board.port, "--stay", "--json")
         assert completed.code == 0, completed.err
         difference = np.subtract(completed.json["pulses"], list(board.net().values()))
-        wrong = np.where(np.isin(np.arange(6), joints), edges(arm) - away, 0)
+        wrong = np.where(np.isin(np.arange(6), joints), switch_pulses(arm) - away, 0)
         assert difference.tolist() == wrong.tolist()
         lost = {joint_loss["joint"]: abs(joint_loss["steps"]) for joint_loss in completed.json["lost_steps"]}
         assert lost == dict(zip(names, np.abs(wrong[list(joints)]).tolist(), strict=True))

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import pytest
-from emulator import FIRMWARE, make
+from emulator import FIRMWARE, run_make
 
 LEFT = 0  # SHIFTCTRL: both registers shift to the left
 OUT_RIGHT, IN_RIGHT, AUTOPULL, AUTOPUSH = 1 << 19, 1 << 18, 1 << 17, 1 << 16
@@ -54,7 +54,7 @@ WS2812 = [0x6221, 0x1123, 0x1400, 0xA442]
 PWM = [0x9080, 0xA027, 0xA046, 0x00A5, 0x1806, 0xA042, 0x0083]
 
 
-def bits(value: int, count: int, repeats: int) -> str:
+def repeated_bits(value: int, count: int, repeats: int) -> str:
     return "".join(str(value >> i & 1) * repeats for i in range(count))
 
 
@@ -77,7 +77,7 @@ CASES = {
     "UART, 8N1, eight cycles a bit": Case(
         "3.6.3",
         UART_TX,
-        "1" * 8 + "0" * 8 + bits(0x5A, 8, 8) + "1" * 8 + "0" * 8 + bits(0xC3, 8, 8) + "1" * 8,
+        "1" * 8 + "0" * 8 + repeated_bits(0x5A, 8, 8) + "1" * 8 + "0" * 8 + repeated_bits(0xC3, 8, 8) + "1" * 8,
         wrap(0, 3, optional_side=True),
         pinctrl(sides=2, outs=1),
         tx=[(0, [0x5A, 0xC3])],
@@ -120,7 +120,7 @@ CASES = {
     "autopull fills and shifts in one cycle": Case(
         "3.5.4.2",
         [0x6001],
-        "0" + bits(0x5, 4, 1) + bits(0xB, 4, 1) + "11",
+        "0" + repeated_bits(0x5, 4, 1) + repeated_bits(0xB, 4, 1) + "11",
         wrap(0, 0),
         shiftctrl=OUT_RIGHT | AUTOPULL | 4 << 25,
         tx=[(0, [5, 11])],
@@ -172,7 +172,7 @@ CASES = {
 
 @pytest.fixture(scope="module")
 def came() -> dict[str, dict[str, object]]:
-    make("-C", str(FIRMWARE / "sim" / "rp2040"))
+    run_make("-C", str(FIRMWARE / "sim" / "rp2040"))
     cases = [{**asdict(case), "cycles": len(case.pins.replace(" ", ""))} for case in CASES.values()]
     command = ["node", str(Path(__file__).with_name("pio_runner.mjs"))]
     completed = subprocess.run(command, input=json.dumps(cases), capture_output=True, text=True, check=True)

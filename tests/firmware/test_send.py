@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from emulator import EmulatedBoard
-from pins import net
+from pins import net_steps
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.configuration import configure
@@ -22,7 +22,7 @@ from command_line import COUNTS, POSE, ROOT, THREE_DOF, run, run_process
 def test_the_published_pose_on_the_pins(board: EmulatedBoard) -> None:
     completed = run_process("send", THREE_DOF, *POSE, "--port", board.port, "--assume-home")
     assert completed.code == 0, completed.err
-    assert net(board) == COUNTS
+    assert net_steps(board) == COUNTS
     stats = board.stats()
     for axis in "XYZ":
         assert set(stats["axes"][axis]["violations"].values()) == {0}
@@ -35,7 +35,7 @@ def test_waypoints_in_a_file(board: EmulatedBoard, tmp_path: Path) -> None:
     completed = run("send", THREE_DOF, "--batch", path, "--port", board.port, "--assume-home", "--json")
     assert completed.code == 0, completed.err
     assert completed.json["waypoints"] == 5
-    assert net(board) == [0, 0, 0]
+    assert net_steps(board) == [0, 0, 0]
     assert board.stats()["axes"]["Y"]["negative"] > 2000
 
 
@@ -61,7 +61,7 @@ def test_homing_finds_the_switches(board: EmulatedBoard, tmp_path: Path) -> None
     completed = run("home", robot, "--port", board.port, "--json")
     assert completed.code == 0, completed.err
     assert completed.json["position"] == "known"
-    assert_found(completed.json["pulses"], net(board))
+    assert_found(completed.json["pulses"], net_steps(board))
     finish_at = run("send", robot, *POSE, "--port", board.port, "--json")
     assert finish_at.code == 0, finish_at.err
     assert finish_at.json["pulses"] == COUNTS
@@ -72,7 +72,7 @@ def test_a_jog_of_a_lost_arm_is_slow(board: EmulatedBoard) -> None:
     assert completed.code == 0, completed.err
     assert "position is lost" in completed.err
     assert board.stats()["axes"]["X"]["max_rate_hz"] == pytest.approx(60 / 8 * 12800 / 360, rel=0.02)
-    assert 20 < net(board)[0] < 300  # for a second of the host's time: a busy machine gives the board less of it
+    assert 20 < net_steps(board)[0] < 300  # for a second of the host's time: a busy machine gives the board less of it
 
 
 COUPLED = """

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 from emulator import EmulatedBoard
-from pins import at_rest, net, on_the_line
+from pins import at_rest, net_steps, on_the_line
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine
@@ -26,34 +26,34 @@ from armkin.model import build_arm as arms
 from command_line import BUSY, COUNTS, POSE, ROOT, THREE_DOF, run, run_patiently
 
 
-def moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
+def start_moving(board: EmulatedBoard) -> subprocess.Popen[bytes]:
     """A send to the pose that is at its full speed, a fifth of the joints', and has 6 s to go.
 
     One that the machine was too busy for goes on from where the arm stands, as `patiently` does.
     """
     send = ("send", THREE_DOF, *map(str, POSE), "--port", board.port, "--speed", "20")
-    sender, end = started(*send, "--assume-home"), time.monotonic() + 60
-    while net(board)[1] > -1500:
+    sender, end = start_command(*send, "--assume-home"), time.monotonic() + 60
+    while net_steps(board)[1] > -1500:
         if sender.poll() is not None:
             told = sender.communicate()[1].decode()
             assert any(busy in told for busy in BUSY), told
             stands = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json["position"]
-            sender = started(*send, *(["--assume-home"] if stands == "lost" else []))
+            sender = start_command(*send, *(["--assume-home"] if stands == "lost" else []))
         assert time.monotonic() < end, "it does not move"
         time.sleep(0.01)
     return sender
 
 
-def started(*words: str) -> subprocess.Popen[bytes]:
+def start_command(*words: str) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "armkin", *words]
     return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
 
 
-def finish(board: EmulatedBoard) -> None:
+def finish_motion(board: EmulatedBoard) -> None:
     """The next command plans from where the arm stands, to exact counts on the pins."""
     completed = run_patiently("send", THREE_DOF, *POSE, "--port", board.port, "--json")
     assert completed.code == 0, completed.err
-    assert completed.json["pulses"] == net(board) == COUNTS
+    assert completed.json["pulses"] == net_steps(board) == COUNTS
 
 
 def test_a_position_is_kept_through_a_reset_at_rest_and_no_other(board: EmulatedBoard) -> None:
@@ -61,17 +61,17 @@ def test_a_position_is_kept_through_a_reset_at_rest_and_no_other(board: Emulated
     board.control("reset external")
     status = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json
     assert status["position"] == "retained"
-    assert status["pulses"] == net(board)
-    finish(board)
+    assert status["pulses"] == net_steps(board)
+    finish_motion(board)
     board.control("reset power")
     lost = run("send", THREE_DOF, 10, 80, -80, "--port", board.port)
     assert lost.code == 5
     assert "position is lost" in lost.err
-    assert net(board) == COUNTS
+    assert net_steps(board) == COUNTS
 
 
 def test_a_reset_in_motion_is_a_lost_position(board: EmulatedBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     board.control("reset external")
     _, err = sender.communicate(timeout=60)
     assert sender.returncode == 5
@@ -81,28 +81,28 @@ def test_a_reset_in_motion_is_a_lost_position(board: EmulatedBoard) -> None:
     again = run("send", THREE_DOF, *POSE, "--port", board.port)
     assert again.code == 5
     assert "position is lost" in again.err
-    assert net(board) == stopped
+    assert net_steps(board) == stopped
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_stops_on_the_path(board: EmulatedBoard, number: signal.Signals, code: int) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     sender.send_signal(number)
     _, err = sender.communicate(timeout=60)
     assert sender.returncode == code, err
-    stopped = net(board)
+    stopped = net_steps(board)
     assert on_the_line(stopped, [0, 0, 0], COUNTS)
     assert at_rest(board) == stopped
-    finish(board)
+    finish_motion(board)
 
 
 def test_a_killed_process(board: EmulatedBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     sender.kill()
     sender.communicate()
     stopped = at_rest(board)
     assert on_the_line(stopped, [0, 0, 0], COUNTS)
-    finish(board)
+    finish_motion(board)
 
 
 def test_a_boot_loader_hides_the_cause_and_the_position_is_retained() -> None:
@@ -112,7 +112,7 @@ def test_a_boot_loader_hides_the_cause_and_the_position_is_retained() -> None:
         status = run_patiently("status", THREE_DOF, "--port", board.port, "--json").json
         assert (status["position"], status["reset_cause"]) == ("retained", 0)
         assert status["boots"] >= 2
-        finish(board)
+        finish_motion(board)
 
 
 class _KilledError(Exception):
@@ -166,7 +166,7 @@ def _killed_often(seed: int, times: int) -> list[str]:
             if stopped != start if end == start else not on_the_line(stopped, start, end):
                 wrong.append(f"kill {i}: {start} to {end} stopped at {stopped}")
             board.wait(0.3)
-            if net(board) != stopped:
+            if net_steps(board) != stopped:
                 wrong.append(f"kill {i}: moved again")
     return wrong
 
@@ -178,7 +178,7 @@ def test_a_sender_killed_at_random_moments(sample: Callable[[int, int], int]) ->
 
 
 def test_a_cut_cable(board: EmulatedBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     board.control("cut both")
     stopped = at_rest(board)
     assert on_the_line(stopped, [0, 0, 0], COUNTS)
@@ -187,24 +187,24 @@ def test_a_cut_cable(board: EmulatedBoard) -> None:
     assert b"does not answer any more" in err
     board.control("restore")
     board.wait(0.3)
-    assert net(board) == stopped
-    finish(board)
+    assert net_steps(board) == stopped
+    finish_motion(board)
 
 
 def test_the_abort_input(board: EmulatedBoard) -> None:
-    sender = moving(board)
+    sender = start_moving(board)
     board.control("pin A0 0")
     _, err = sender.communicate(timeout=60)
     assert sender.returncode == 5
     assert b"the abort input is active" in err
-    stopped = net(board)
+    stopped = net_steps(board)
     assert on_the_line(stopped, [0, 0, 0], COUNTS)
     blocked = run("send", THREE_DOF, *POSE, "--port", board.port)
     assert blocked.code == 5
     assert "abort input" in blocked.err
-    assert net(board) == stopped
+    assert net_steps(board) == stopped
     board.control("pin A0 z")
-    finish(board)
+    finish_motion(board)
 
 
 def _a_short_move(board: EmulatedBoard) -> None:
@@ -218,7 +218,7 @@ def test_a_noisy_line_ends_at_exact_counts(seed: int) -> None:
     """1 % of the bytes flipped and 1 % dropped, in both directions."""
     with EmulatedBoard(seed=seed) as board:
         _a_short_move(board)
-        start = net(board)
+        start = net_steps(board)
         board.control(f"noise flip 0.01 drop 0.01 seed {seed}")
         completed = run("send", THREE_DOF, *POSE, "--port", board.port, "--json")
         now = at_rest(board)
@@ -228,7 +228,7 @@ def test_a_noisy_line_ends_at_exact_counts(seed: int) -> None:
             assert "its position is known" in completed.err
             assert on_the_line(now, start, COUNTS)
         board.control("restore")
-        finish(board)
+        finish_motion(board)
 
 
 def test_after_a_cut_of_the_power_the_position_is_declared_lost() -> None:

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from bare_host import WIDE, BareHost, batches, image_for
-from emulator import BUILD, FIRMWARE, EmulatedBoard, make
-from golden import Talk, talks
+from bare_host import WIDE, BareHost, cut_batches, image_for
+from emulator import BUILD, FIRMWARE, EmulatedBoard, run_make
+from golden import Talk, read_talks
 from measure import counts_at_home
 from numpy.typing import NDArray
 
@@ -21,7 +21,7 @@ INSTRUCTION, LOCKED = 6, 130
 
 def in_c(board: str) -> Path:
     """The firmware whose ticks all go the long way."""
-    make("-C", str(FIRMWARE), f"BOARD={board}", "TICK=c")
+    run_make("-C", str(FIRMWARE), f"BOARD={board}", "TICK=c")
     return BUILD / f"{board}-tick-c.elf"
 
 
@@ -39,7 +39,7 @@ def some_segments(rng: np.random.Generator, count: int, axes: int) -> list[Segme
     return out
 
 
-def edges(board: str, elf: Path | None, segments: list[Segment]) -> dict[str, NDArray[np.int64]]:
+def step_edges(board: str, elf: Path | None, segments: list[Segment]) -> dict[str, NDArray[np.int64]]:
     """When each STEP pin rose, and its motor's count then; the line is quiet while they do."""
     axes = 5 if board == "mega_ramps14" else 4
     wide = replace(WIDE, max_rate=60_000, max_accel=15_000_000)
@@ -48,7 +48,7 @@ def edges(board: str, elf: Path | None, segments: list[Segment]) -> dict[str, ND
         host.run(0.02)
         host.setup(image_for(board, wide), counts_at_home(board))
         pause = Segment(150, 16_000, 0, (0,) * axes)
-        plan = batches(tuple(range(axes)), (0,) * axes, [pause, *segments], 4)
+        plan = cut_batches(tuple(range(axes)), (0,) * axes, [pause, *segments], 4)
         for batch in plan:
             host.order(batch.payload(0))
         host.run(0.45)
@@ -63,7 +63,7 @@ def edges(board: str, elf: Path | None, segments: list[Segment]) -> dict[str, ND
 @pytest.mark.parametrize("board", ["uno_cnc_shield", "mega_ramps14"])
 def test_every_edge_comes_with_the_tick_that_c_makes(board: str) -> None:
     segments = some_segments(np.random.default_rng(26), 30, 5 if board == "mega_ramps14" else 4)
-    by_hand, in_gcc = edges(board, None, segments), edges(board, in_c(board), segments)
+    by_hand, in_gcc = step_edges(board, None, segments), step_edges(board, in_c(board), segments)
     for name, (_, counts) in by_hand.items():
         assert (counts == in_gcc[name][1]).all()
     later = {name: cycles - in_gcc[name][0] for name, (cycles, _) in by_hand.items()}
@@ -74,7 +74,7 @@ def test_every_edge_comes_with_the_tick_that_c_makes(board: str) -> None:
         assert np.quantile(np.abs(off), 0.9) <= INSTRUCTION
 
 
-@pytest.mark.parametrize("talk", [t for t in talks() if t.board == "uno_cnc_shield"], ids=lambda talk: talk.name)
+@pytest.mark.parametrize("talk", [t for t in read_talks() if t.board == "uno_cnc_shield"], ids=lambda talk: talk.name)
 def test_c_answers_as_written(talk: Talk) -> None:
     with EmulatedBoard(talk.board, elf=in_c(talk.board), speed="step") as board:
         assert talk.replay(board) >= 2

@@ -14,7 +14,7 @@ def test_a_path_is_driven_where_it_is(tmp_path: Path) -> None:
     """Both reports of a false start: 67 mm off a circle, 36 mm off two lines; all: `tests/bench/bench_starts.py`."""
     with EmulatedBoard(trace=True) as board:
         for moves, place in zip(PATHS[:2], ((0, 90, -90), (8, 84, -80)), strict=True):
-            found = starts_on_pins.sent(board, tmp_path, moves, place)
+            found = starts_on_pins.send_path_from(board, tmp_path, moves, place)
             assert found.off_mm < 0.4
             assert found.begins_mm < 0.4
             assert found.rest == 0

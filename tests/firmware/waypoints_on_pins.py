@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from curve_on_pins import counts_of, late_us, predicted
+from curve_on_pins import counts_of, late_us, predicted_steps
 from emulator import EmulatedBoard
 
 import armkin
@@ -52,20 +52,20 @@ class Streamed:
         return flows and self.exact and not self.error and not self.violations
 
 
-def rows(count: int) -> Array:
+def waypoint_rows(count: int) -> Array:
     """Joint values [deg] on a wavy ring around the middle of three_dof's limits, some degrees apart and off it."""
     i = 0.1 * np.arange(1, count + 1)
     ring = np.stack([35 * np.sin(i), 75 + 30 * np.cos(i), -70 + 35 * np.sin(0.37 * i)], axis=-1)
     return np.round(ring + np.random.default_rng(7).uniform(-0.3, 0.3, ring.shape), 4)
 
 
-def stream(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Streamed:
+def stream_waypoints(count: int, *, blend: float = BLEND, patience: float = 0.0) -> Streamed:
     """Send so many waypoints from home, look at every edge; patience: as of the emulated board."""
-    arm, q = armkin.load("three_dof"), rows(count)
+    arm, q = armkin.load("three_dof"), waypoint_rows(count)
     plan = Planner(board_of(arm), 1.0, blend).plan([0, 0, 0], np.deg2rad(q))
     assert isinstance(plan, Cut)
     segments = [one for move in plan.moves() for one in move.segments]
-    wanted = predicted(segments, [0, 0, 0])
+    wanted = predicted_steps(segments, [0, 0, 0])
     with EmulatedBoard(trace=True, patience=patience) as board, tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "rows.csv"
         file.write_text("".join(f"{a},{b},{c}\n" for a, b, c in q.tolist()))

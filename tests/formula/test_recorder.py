@@ -53,7 +53,7 @@ COLUMNS = [
 ]
 
 
-def expressions(operations: dict[str, Callable[..., Any]]) -> st.SearchStrategy[Expression]:
+def expression_strategy(operations: dict[str, Callable[..., Any]]) -> st.SearchStrategy[Expression]:
     leaves = st.one_of(
         st.integers(0, INPUTS - 1).map(lambda k: ("input", k)),
         st.sampled_from([0.0, 1.0, -1.0, 0.5, -3.25]).map(lambda c: ("constant", c)),
@@ -71,7 +71,7 @@ def expressions(operations: dict[str, Callable[..., Any]]) -> st.SearchStrategy[
     return st.recursive(leaves, grown, max_leaves=12)
 
 
-def value(expression: Expression, inputs: Sequence[Any], operations: dict[str, Callable[..., Any]]) -> Any:
+def value_of(expression: Expression, inputs: Sequence[Any], operations: dict[str, Callable[..., Any]]) -> Any:
     """An expression of arrays, numbers or symbols."""
     name, *operands = expression
     if name == "input":
@@ -80,17 +80,17 @@ def value(expression: Expression, inputs: Sequence[Any], operations: dict[str, C
         return operands[0]
     if name == "column":
         return COLUMNS[operands[0]]
-    arguments = [value(part, inputs, operations) for part in operands]
+    arguments = [value_of(part, inputs, operations) for part in operands]
     if all(isinstance(a, float) for a in arguments):
         return float(operations[name](*arguments))  # constants stay numbers, as `arrays` keeps them
     return operations[name](*arguments)
 
 
-def check(expression: Expression, operations: dict[str, Callable[..., Any]], tolerance: float) -> None:
+def check_operations(expression: Expression, operations: dict[str, Callable[..., Any]], tolerance: float) -> None:
     rng = np.random.default_rng(7)
     inputs = [np.concatenate([rng.uniform(-10, 10, 5), [0.0, 1.0, -2.0]]) for _ in range(INPUTS)]
-    expected = np.asarray(value(expression, inputs, operations), dtype=float)
-    formula = StraightLineCode(lambda symbols: [value(expression, symbols, operations)], INPUTS)
+    expected = np.asarray(value_of(expression, inputs, operations), dtype=float)
+    formula = StraightLineCode(lambda symbols: [value_of(expression, symbols, operations)], INPUTS)
     [batch] = formula.run(inputs, formula.workspace(len(inputs[0])))
     values = np.broadcast_to(np.asarray(batch, dtype=float), expected.shape)
     np.testing.assert_allclose(values, expected, rtol=tolerance, atol=tolerance)
@@ -102,15 +102,15 @@ def check(expression: Expression, operations: dict[str, Callable[..., Any]], tol
 
 
 @settings(max_examples=300, deadline=None)
-@given(expressions(EXACT))
+@given(expression_strategy(EXACT))
 def test_exact_operations_are_numpys_to_the_last_bit(expression: Expression) -> None:
-    check(expression, EXACT, 0.0)
+    check_operations(expression, EXACT, 0.0)
 
 
 @settings(max_examples=150, deadline=None)
-@given(expressions(SMOOTH))
+@given(expression_strategy(SMOOTH))
 def test_other_operations_are_numpys_to_rounding(expression: Expression) -> None:
-    check(expression, SMOOTH, 1e-10)
+    check_operations(expression, SMOOTH, 1e-10)
 
 
 def test_equal_operations_are_recorded_once_and_known_zeros_not_at_all() -> None:

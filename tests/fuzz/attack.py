@@ -36,30 +36,30 @@ def attack(*words: object, stdin: bytes = b"") -> Result:
         assert completed.out == "" or ("--batch" in words and (words[0] != "send" or "--json" not in words)), shown
     if "--json" in words and completed.out:
         for line in completed.out.splitlines():
-            _finite(json.loads(line, parse_constant=_refused), shown)
+            _assert_finite(json.loads(line, parse_constant=_refuse_word), shown)
     return completed
 
 
-def generator(seed: object) -> random.Random:
+def random_generator(seed: object) -> random.Random:
     """Random numbers, the same in every run; ARMKIN_FUZZ_SEED makes others of them."""
     return random.Random(f"{seed} {os.environ.get('ARMKIN_FUZZ_SEED', '')}")
 
 
-def _refused(word: str) -> float:
+def _refuse_word(word: str) -> float:
     raise AssertionError(f"{word} in JSON")
 
 
-def _finite(value: Any, shown: str) -> None:
+def _assert_finite(value: Any, shown: str) -> None:
     if isinstance(value, dict):
         value = list(value.values())
     if isinstance(value, list):
         for part in value:
-            _finite(part, shown)
+            _assert_finite(part, shown)
     elif isinstance(value, float):
         assert math.isfinite(value), shown
 
 
-def spoilt(rng: random.Random, text: str) -> str:
+def spoil_text(rng: random.Random, text: str) -> str:
     """A robot file with one to three things wrong, or odd."""
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         lines = text.splitlines(keepends=True)

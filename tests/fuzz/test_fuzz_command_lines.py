@@ -7,7 +7,7 @@ import string
 from pathlib import Path
 
 import pytest
-from attack import NUMBERS, attack, generator
+from attack import NUMBERS, attack, random_generator
 
 COMMANDS = (
     "fk",
@@ -76,7 +76,7 @@ TEXTS = (
 
 @pytest.mark.parametrize("seed", range(4))
 def test_any_words(seed: int, rounds: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = generator(seed)
+    rng = random_generator(seed)
     monkeypatch.delenv("DISPLAY", raising=False)
     for _ in range(2 * rounds):
         words: list[str] = [rng.choice(COMMANDS), rng.choice(ROBOTS)]
@@ -104,7 +104,7 @@ def test_any_words(seed: int, rounds: int, tmp_path: Path, monkeypatch: pytest.M
 
 @pytest.mark.parametrize("seed", range(2))
 def test_any_rows(seed: int, rounds: int) -> None:
-    rng = generator(seed)
+    rng = random_generator(seed)
     for _ in range(rounds):
         rows = [
             ",".join(rng.choice(NUMBERS) if rng.random() < 0.2 else f"{rng.uniform(-90, 90):.3f}" for _ in range(3))
@@ -119,7 +119,7 @@ def test_any_rows(seed: int, rounds: int) -> None:
 
 @pytest.mark.parametrize("seed", range(2))
 def test_any_piped_answer(seed: int, rounds: int) -> None:
-    rng = generator(seed)
+    rng = random_generator(seed)
     intact = json.loads(attack("pulses", "three_dof", 10, 80, -70, "--json").out)
     odd: list[object] = [None, True, "x", 10**400, -1, 1e300, [], {}, [1e9] * 3, "three_dof", 1.5, [[1]], [None] * 3]
     for _ in range(rounds):

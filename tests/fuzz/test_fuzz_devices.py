@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from attack import attack, generator
+from attack import attack, random_generator
 
 from armkin import load
 from armkin.board.firmware import streaming
@@ -106,7 +106,7 @@ class Numbers:
 
 @pytest.mark.parametrize("robot", BOARDS_OF, ids=("own firmware", "grbl", "servo bus", "klipper"))
 def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    rng = generator(robot.rpartition("/")[2])
+    rng = random_generator(robot.rpartition("/")[2])
     boards: list[Port] = []
 
     def opened(*words_given: object, **options: object) -> Port:

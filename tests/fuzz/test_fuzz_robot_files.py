@@ -6,7 +6,7 @@ import random
 from pathlib import Path
 
 import pytest
-from attack import attack, generator, spoilt
+from attack import attack, random_generator, spoil_text
 
 import armkin
 from command_line import ROOT
@@ -17,21 +17,21 @@ FILES = sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests/robots"
 
 @pytest.mark.parametrize("seed", range(4))
 def test_whatever_passes_validation_works_in_every_command(seed: int, rounds: int, tmp_path: Path) -> None:
-    rng = generator(seed)
+    rng = random_generator(seed)
     good = 0
     for i in range(rounds):
         path = tmp_path / f"arm{i}.yaml"
-        path.write_text(spoilt(rng, rng.choice(FILES).read_text()), encoding="utf-8")
+        path.write_text(spoil_text(rng, rng.choice(FILES).read_text()), encoding="utf-8")
         before = path.read_bytes()
         if attack("info", path, "--json").code != 0:
             continue
         good += 1
-        use(rng, path)
+        use_robot(rng, path)
         assert path.read_bytes() == before
     assert good > rounds // 20
 
 
-def use(rng: random.Random, path: Path) -> None:
+def use_robot(rng: random.Random, path: Path) -> None:
     """Every command that needs no board, at home and at a random pose."""
     arm = armkin.load(str(path))
     attack("fk", path, "home", "--json", "--frames")

@@ -44,10 +44,10 @@ def random_joints(screw: Screws, count: int, seed: int) -> Array:
     return np.where(screw.prismatic, slide, turn)
 
 
-def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
+def examine_answers(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
     """Solve for what the joints q (N, n) reach and compare with the oracle."""
     definition, _ = solver(arm, task)
-    goals = oracle.goal(definition, screw, q)
+    goals = oracle.goal_of_joints(definition, screw, q)
     s = armkin.ik(arm, goals.array(), task)
     weak = oracle.weakness(screw, goals, q)
     nearest = oracle.distance(screw, s.q, q[:, None]).min(axis=1, initial=np.inf)
@@ -57,15 +57,15 @@ def examine(arm: Arm, screw: Screws, task: str | None, q: Array) -> Report:
     for k in np.flatnonzero(lost & (nearest < 0.3)):
         d = s.q[k, int(oracle.distance(screw, s.q[k], q[k]).argmin())] - q[k]
         middle = q[k] + 0.5 * np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
-        across = truth.across(screw, goals.take([k]), middle[None], weak=1e-4)
+        across = truth.settle_across(screw, goals.take([k]), middle[None], weak=1e-4)
         onto = bool(oracle.distance(screw, across[0], middle) > 0.1 * nearest[k])  # one of the two
-        residual, turned = oracle.missing(screw, goals.take([k]), across)
+        residual, turned = oracle.pose_error(screw, goals.take([k]), across)
         # of a rotation's three columns two are at right angles to its axis, and each moves by the angle
         angle = turned[0] / (np.sqrt(2.0) if goals.orientation == "full" else 1.0)
         lost[k] = onto or np.hypot(residual[0] / arm.reach, angle) > 1e-9
     B = s.q.shape[1]
     rows, columns = np.nonzero(s.valid)
-    mm, rad = oracle.missing(screw, goals.take(rows), s.q[rows, columns])
+    mm, rad = oracle.pose_error(screw, goals.take(rows), s.q[rows, columns])
     duplicates = 0
     for i in range(B):
         for j in range(i):

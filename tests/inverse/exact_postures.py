@@ -80,7 +80,7 @@ class Posture(NamedTuple):
     moving: str
 
 
-def radians(letter: str) -> float:
+def letter_radians(letter: str) -> float:
     """The angle of a letter."""
     k = LETTERS.index(letter)
     if k < 24:
@@ -93,14 +93,14 @@ def radians(letter: str) -> float:
     return float(angle - 2 * np.pi if angle > np.pi else angle)
 
 
-def joints(kinds: str, letters: str) -> NDArray[np.float64]:
+def joint_values(kinds: str, letters: str) -> NDArray[np.float64]:
     """Joint values [rad | mm] of a row's letters."""
     return np.array([
-        SLIDES[LETTERS.index(x)] if kind == "P" else radians(x) for kind, x in zip(kinds, letters, strict=True)
+        SLIDES[LETTERS.index(x)] if kind == "P" else letter_radians(x) for kind, x in zip(kinds, letters, strict=True)
     ])  # fmt: skip
 
 
-def read() -> list[Posture]:
+def read_postures() -> list[Posture]:
     """The rows of the file."""
     names = list(ARMS)
     rows = (line.split() for line in FILE.read_text().splitlines() if not line.startswith("#"))
@@ -214,7 +214,7 @@ class Series:
 # ---- the arm
 
 
-def equations(field: Field, series: Series, arm: str, letters: str, t: Ints) -> Ints:
+def pose_equations(field: Field, series: Series, arm: str, letters: str, t: Ints) -> Ints:
     """Polynomials (rows, P) that vanish where the target is kept; t: (n, P) half tangents of the joints' motions.
 
     Every entry of the chain is multiplied by the denominators 1 + t^2.
@@ -256,14 +256,14 @@ def equations(field: Field, series: Series, arm: str, letters: str, t: Ints) -> 
     return M[:, 3] if task == "xyz" else M.reshape(12, -1)
 
 
-def structure(field: Field, arm: str, letters: str) -> Posture:
+def posture_structure(field: Field, arm: str, letters: str) -> Posture:
     """What a posture is."""
     p, n = field.p, len(letters)
     linear = Series(field, n, 1)
     variables = linear.zeros(n)
     variables[np.arange(n), [linear.place[tuple(row)] for row in np.eye(n, dtype=int).tolist()]] = 1
     place = variables.argmax(axis=1)
-    J = equations(field, linear, arm, letters, variables)[:, place]
+    J = pose_equations(field, linear, arm, letters, variables)[:, place]
     _, solved, rows = field.reduced(J)
     lost = n - len(solved)
     if not lost:
@@ -275,11 +275,11 @@ def structure(field: Field, arm: str, letters: str) -> Posture:
         t[j, series.place[tuple(int(i == k) for i in range(lost))]] = 1
     back = field.inverse(J[np.ix_(rows, solved)])
     for _ in range(int(series.degrees.max())):  # each makes the series right by one degree more
-        left = equations(field, series, arm, letters, t)[rows]
+        left = pose_equations(field, series, arm, letters, t)[rows]
         for k, j in enumerate(solved):
             for i in range(len(rows)):
                 t[j] = (t[j] - back[k, i] * left[i]) % p
-    g = equations(field, series, arm, letters, t)
+    g = pose_equations(field, series, arm, letters, t)
     multiplicity = _multiplicity(field, series, np.delete(g, rows, axis=0))
     curve = lost == 1 and not multiplicity
     moving = "".join(str(j + 1) for j in range(n) if curve and t[j].any())
@@ -303,7 +303,7 @@ def _multiplicity(field: Field, series: Series, g: Ints) -> int:
     return 0
 
 
-def rows(rng: np.random.Generator, number: int, choices: list[list[int]], count: int) -> list[str]:
+def posture_rows(rng: np.random.Generator, number: int, choices: list[list[int]], count: int) -> list[str]:
     """Lines of the file: so many postures of an arm, of letters as choices say."""
     arm, (_, kinds, _) = list(ARMS.items())[number]
     first, second = map(Field, PRIMES)
@@ -314,8 +314,8 @@ def rows(rng: np.random.Generator, number: int, choices: list[list[int]], count:
             LETTERS[int(rng.integers(len(SLIDES)) if kind == "P" else rng.choice(choice))] for kind in kinds
         )
         if letters not in row_of:
-            posture = structure(first, arm, letters)
-            assert not posture.lost or posture == structure(second, arm, letters)
+            posture = posture_structure(first, arm, letters)
+            assert not posture.lost or posture == posture_structure(second, arm, letters)
             row_of[letters] = f"{number} {letters} {posture.lost} {posture.multiplicity} {posture.moving or '-'}"
     return list(row_of.values())
 
@@ -324,7 +324,7 @@ def main() -> None:
     lines = ["# arm, joints' letters, lost directions, multiplicity (0: a curve), joints that move: exact_postures.py"]
     for seed, choices, count in ((1, KINDS, COUNT), (2, KINDS_OF_HALVES, HALVES)):
         rng = np.random.default_rng(seed)
-        lines += [line for number in range(len(ARMS)) for line in rows(rng, number, choices, count)]
+        lines += [line for number in range(len(ARMS)) for line in posture_rows(rng, number, choices, count)]
     FILE.write_text("\n".join(lines) + "\n")
 
 

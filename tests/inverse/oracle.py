@@ -49,15 +49,15 @@ def shift(x: float, y: float, z: float) -> Array:
     return T
 
 
-def placed(pose: Any) -> Array:
+def pose_matrix(pose: Any) -> Array:
     """A robot file's pose {xyz, rpy} as 4 x 4."""
     roll, pitch, yaw = pose.rpy
     return shift(*pose.xyz) @ rotation("z", yaw) @ rotation("y", pitch) @ rotation("x", roll)
 
 
-def screws(file: Any) -> Screws:
+def screws_of(file: Any) -> Screws:
     """The screw axes of a robot file of any convention."""
-    base, tool = placed(file.base), placed(file.tool)
+    base, tool = pose_matrix(file.base), pose_matrix(file.tool)
     prismatic = np.array([joint.type == "prismatic" for joint in file.joints])
     sign = np.array([joint.sign for joint in file.joints], dtype=float)
     w, p = [], []
@@ -72,7 +72,7 @@ def screws(file: Any) -> Screws:
                 point = np.cross(axis, np.array(joint.screw.v, dtype=float))
             w.append(base[:3, :3] @ axis)
             p.append(base[:3, :3] @ point + base[:3, 3])
-        end = base @ placed(file.zero_pose) @ tool
+        end = base @ pose_matrix(file.zero_pose) @ tool
     else:
         P = base
         for joint in file.joints:
@@ -172,7 +172,7 @@ class Goal(NamedTuple):
         return np.concatenate(parts, axis=1)
 
 
-def goal(task: Any, screw: Screws, q: Array) -> Goal:
+def goal_of_joints(task: Any, screw: Screws, q: Array) -> Goal:
     """What joint values q reach, in the terms of a task of `armkin`."""
     return Goal(
         task.position,
@@ -184,7 +184,7 @@ def goal(task: Any, screw: Screws, q: Array) -> Goal:
     )
 
 
-def missing(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
+def pose_error(screw: Screws, goals: Goal, q: Array) -> tuple[Array, Array]:
     """Largest position error [mm] and angle error [rad] of joint values (M, n): (M,), (M,)."""
     T = forward(screw, q)
     mm = np.linalg.norm((T - goals.T)[:, : goals.position, 3], axis=1)
@@ -260,7 +260,7 @@ def branches(screw: Screws, goals: Goal, starts: int, seed: int) -> list[Array]:
     q, size = newton(
         screw, goals.take(np.repeat(np.arange(count), starts)), rng.uniform(-width, width, (count * starts, n))
     )
-    mm, rad = missing(screw, goals.take(np.repeat(np.arange(count), starts)), q)
+    mm, rad = pose_error(screw, goals.take(np.repeat(np.arange(count), starts)), q)
     good = (size < 1e-11) & (mm < 1e-8 * screw.size) & (rad < 1e-8)
     sets = []
     for k in range(count):

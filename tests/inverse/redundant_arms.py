@@ -7,7 +7,7 @@ import numpy as np
 import armkin
 
 
-def postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+def redundant_postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     """Joint values within limits (N, n), and the targets that they reach."""
     low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
     q = np.random.default_rng(seed).uniform(low, high, (count, arm.n))
@@ -29,7 +29,7 @@ def held_answers(arm: armkin.Arm, joint: int, value: float, target: np.ndarray, 
     return np.asarray(q[((q >= arm.lower - 1e-12) & (q <= arm.upper + 1e-12)).all(axis=1)])
 
 
-def covers(arm: armkin.Arm, intervals: np.ndarray, value: float | np.ndarray, slack: float = 1e-8) -> np.ndarray:
+def covers_value(arm: armkin.Arm, intervals: np.ndarray, value: float | np.ndarray, slack: float = 1e-8) -> np.ndarray:
     """Which intervals (B, 2) hold a value, modulo whole turns."""
     middle, half = intervals.mean(axis=-1), np.ptp(intervals, axis=-1) / 2
     return np.asarray(np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import truth
-from geometries import Case, case, random_case, right_angles
-from oracle import goal
+from geometries import Case, case_of, random_case, right_angles
+from oracle import goal_of_joints
 
 import armkin
 from armkin.inverse.elimination import method
@@ -21,30 +21,30 @@ RIGHT_ANGLED = {  # seeds of arms that the elimination settles never, hardly eve
 }
 
 
-def built(seed: int) -> Case:
-    return case(right_angles(np.random.default_rng(seed)), "pose")
+def right_angled_case(seed: int) -> Case:
+    return case_of(right_angles(np.random.default_rng(seed)), "pose")
 
 
 @pytest.mark.parametrize("seed", RIGHT_ANGLED)
 def test_right_angled_arms_are_complete(seed: int) -> None:
-    arm, screw, task = built(seed)
+    arm, screw, task = right_angled_case(seed)
     assert armkin.method(arm, task)[0] == RIGHT_ANGLED[seed]
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (400, 6))
-    verdict = truth.judge(arm, screw, task, q, goal(solver(arm, task)[0], screw, q).array())
+    verdict = truth.judge(arm, screw, task, q, goal_of_joints(solver(arm, task)[0], screw, q).array())
     assert verdict, str(verdict)
     assert verdict.solutions.complete.mean() >= 0.99
 
 
 @pytest.mark.parametrize("seed", RIGHT_ANGLED)
 def test_round_postures_and_singular_surfaces_of_right_angled_arms(seed: int) -> None:
-    arm, screw, task = built(seed)
+    arm, screw, task = right_angled_case(seed)
     definition, _ = solver(arm, task)
     kinds = {f"multiples of {step}": truth.round_postures(arm, step, 4, seed=2) for step in (90, 45)}
     kinds |= truth.singular_postures(arm, screw, task, 2, seed=2)
     q = np.concatenate(list(kinds.values()))
-    target = goal(definition, screw, q).array()
+    target = goal_of_joints(definition, screw, q).array()
     for near in (None, q):
-        verdict, report = truth.judged(arm, screw, kinds, target, near, task)
+        verdict, report = truth.judge_kinds(arm, screw, kinds, target, near, task)
         assert verdict, report
 
 
@@ -59,12 +59,12 @@ def test_round_postures_and_singular_surfaces_of_right_angled_arms(seed: int) ->
     ],
 )
 def test_postures_that_were_lost(seed: int, kind: str | float, count: int, rows: list[int]) -> None:
-    arm, screw, task = built(seed)
+    arm, screw, task = right_angled_case(seed)
     if isinstance(kind, str):
         q = truth.singular_postures(arm, screw, task, count)[kind][rows]
     else:
         q = truth.round_postures(arm, kind, count)[rows]
-    target = goal(solver(arm, task)[0], screw, q).array()
+    target = goal_of_joints(solver(arm, task)[0], screw, q).array()
     for near in (None, q):
         verdict = truth.judge(arm, screw, task, q, target, near)
         assert verdict, str(verdict)

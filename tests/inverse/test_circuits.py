@@ -9,7 +9,7 @@ import oracle
 import pytest
 import truth
 from oracle import Goal, Screws
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 from truth import Array, Bool
 
 import armkin
@@ -35,10 +35,10 @@ def leads_to(screw: Screws, goals: Goal, q: Array, to: Array) -> Bool:
         ahead = np.linalg.svd(J)[2][:, -1]
         side = (ahead * last[k]).sum(axis=1) if step else way * ahead[:, np.abs(ahead[0]).argmax()]
         last[k] = ahead * np.sign(side)[:, None]
-        beside = truth.across(screw, goals.take(k), standing[k] + STEP * last[k], weak=1e-4)
-        standing[k] = truth.across(screw, goals.take(k), beside, weak=1e-4)
+        beside = truth.settle_across(screw, goals.take(k), standing[k] + STEP * last[k], weak=1e-4)
+        standing[k] = truth.settle_across(screw, goals.take(k), beside, weak=1e-4)
         met[k] |= oracle.distance(screw, to[k], standing[k][:, None]) < 0.75 * STEP
-        back = (step > 2) & (np.linalg.norm(truth._way(screw, q[k], standing[k]), axis=1) < 0.6 * STEP)
+        back = (step > 2) & (np.linalg.norm(truth._joint_difference(screw, q[k], standing[k]), axis=1) < 0.6 * STEP)
         stray = np.linalg.norm(oracle._residual(screw, goals.take(k), standing[k])[0], axis=1) > 1e-7
         going[k] = ~(back | stray)
         if not going.any():
@@ -51,15 +51,15 @@ def leads_to(screw: Screws, goals: Goal, q: Array, to: Array) -> Bool:
 )
 def test_each_circuit_is_listed_once(name: str, surface: str, sample: Callable[[int, int], int]) -> None:
     """Of these up to a quarter lay on a circuit that was not listed."""
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     q = truth.singular_postures(arm, screw, None, 40, seed=3)[surface][: sample(40, 20)]
-    goals = oracle.goal(task, screw, q)
+    goals = oracle.goal_of_joints(task, screw, q)
     s = armkin.ik(arm, goals.array())
     k = np.flatnonzero((s.status == Status.SINGULAR) & (s.free.sum(axis=1) > 2))
     assert len(k) > sample(15, 7)
     is_listed = oracle.distance(screw, s.q[k], q[k][:, None]).min(axis=1) < 1e-3
-    held = np.where(s.free[k, None], 0.0, np.abs(truth._way(screw, q[k][:, None], s.q[k]))).max(axis=2)
+    held = np.where(s.free[k, None], 0.0, np.abs(truth._joint_difference(screw, q[k][:, None], s.q[k]))).max(axis=2)
     leads = leads_to(screw, goals.take(k), q[k], s.q[k]) & (held < 1e-4)
     assert (is_listed | leads.any(axis=1)).all(), q[k[~(is_listed | leads.any(axis=1))]]
     assert (leads.sum(axis=1) <= 1).all(), q[k[leads.sum(axis=1) > 1]]
@@ -67,10 +67,10 @@ def test_each_circuit_is_listed_once(name: str, surface: str, sample: Callable[[
 
 def test_circuits_that_nearly_meet_are_two() -> None:
     """0.06 rad apart where the four bars are nearly in one line: long steps went from one to the other."""
-    arm, screw = shipped("mycobot_280")
+    arm, screw = shipped_arm("mycobot_280")
     task, _ = solver(arm, None)
     q = np.array([[1.172430787496, 0.754675891425, 1.099819728616, 1.789600044792, np.pi / 2, -1.650145814715]])
-    goals = oracle.goal(task, screw, q)
+    goals = oracle.goal_of_joints(task, screw, q)
     s = armkin.ik(arm, goals.array())
     assert s.free.tolist() == [[False, True, True, True, False, True]]
     assert leads_to(screw, goals, q, s.q).sum() == 1

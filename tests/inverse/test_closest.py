@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from oracle import forward, screws
+from oracle import forward, screws_of
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
@@ -16,10 +16,10 @@ from armkin.inverse.tasks.task import read_targets
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
-def cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -> np.ndarray:
+def pose_cost(arm: armkin.Arm, task: str | None, target: np.ndarray, q: np.ndarray) -> np.ndarray:
     """What `closest` minimises, from the oracle's kinematics: squared distance and angle at a quarter of the reach."""
     definition = task_for(arm, task)
-    T = forward(screws(arm.file), q)
+    T = forward(screws_of(arm.file), q)
     goal = read_targets(definition, target)[0]
     r = residual(definition, T, q, np.repeat(goal, len(q), axis=0))
     p = definition.position
@@ -44,16 +44,16 @@ def test_no_legal_pose_nearby_is_better(name: str, task: str | None, target: lis
     closest = armkin.closest(arm, target, task)
     assert closest.converged
     assert ((closest.q >= arm.lower) & (closest.q <= arm.upper)).all()
-    T = forward(screws(arm.file), closest.q)
+    T = forward(screws_of(arm.file), closest.q)
     np.testing.assert_allclose(closest.position, T[:3, 3], atol=1e-9)
     p = task_for(arm, task).position
     assert closest.distance == pytest.approx(np.linalg.norm(T[:p, 3] - np.array(target)[:p]), abs=1e-9)
-    closest_cost = cost(arm, task, np.array(target), closest.q[None])[0]
+    closest_cost = pose_cost(arm, task, np.array(target), closest.q[None])[0]
     rng = np.random.default_rng(1)
     for size in (1e-4, 1e-3, 1e-2, 0.1):
         step = rng.normal(size=(2000, arm.n)) * size * np.where(arm.prismatic, arm.reach / 5, 1.0)
         around = np.clip(closest.q + step, arm.lower, arm.upper)
-        assert cost(arm, task, np.array(target), around).min() >= closest_cost * (1 - 1e-9) - 1e-9
+        assert pose_cost(arm, task, np.array(target), around).min() >= closest_cost * (1 - 1e-9) - 1e-9
 
 
 def test_poses_that_five_joints_cannot_reach() -> None:
@@ -73,11 +73,11 @@ def test_poses_that_five_joints_cannot_reach() -> None:
     closest = armkin.closest(arm, tilted, "pose")
     assert closest.converged
     assert 0.0 < closest.angle < 0.25
-    closest_cost = cost(arm, "pose", tilted, closest.q[None])[0]
+    closest_cost = pose_cost(arm, "pose", tilted, closest.q[None])[0]
     rng = np.random.default_rng(2)
     for size in (1e-3, 1e-2, 0.1):
         around = np.clip(closest.q + rng.normal(size=(2000, 5)) * size, arm.lower, arm.upper)
-        assert cost(arm, "pose", tilted, around).min() >= closest_cost * (1 - 1e-9)
+        assert pose_cost(arm, "pose", tilted, around).min() >= closest_cost * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(("name", "count"), [("three_dof", 3), ("ra02", 4), ("moveo", 5), ("labvolt_5150", 5)])
@@ -86,7 +86,7 @@ def test_full_poses_of_short_arms(name: str, count: int) -> None:
     arm = armkin.load(ROBOTS / f"{name}.yaml")
     assert arm.n == count
     q = np.random.default_rng(3).uniform(-2, 2, (40, count))
-    s = armkin.ik(arm, forward(screws(arm.file), q), "pose")
+    s = armkin.ik(arm, forward(screws_of(arm.file), q), "pose")
     d = s.q - q[:, None]
     d = np.abs(d - 2 * np.pi * np.rint(d / (2 * np.pi))).max(axis=2)
     assert np.nanmin(d, axis=1).max() < 1e-6

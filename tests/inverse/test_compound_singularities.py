@@ -8,9 +8,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import truth
-from geometries import case, right_angles
-from oracle import goal
-from test_every_branch import shipped
+from geometries import case_of, right_angles
+from oracle import goal_of_joints
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -60,11 +60,11 @@ from armkin.inverse.solvers.recognise import solver
     ],
 )
 def test_compound_singularities(name: str, q: list[float]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     joints = np.where(arm.prismatic, [q], np.radians([q]))
     for near in (None, joints):
-        verdict = truth.judge(arm, screw, None, joints, goal(task, screw, joints).array(), near)
+        verdict = truth.judge(arm, screw, None, joints, goal_of_joints(task, screw, joints).array(), near)
         assert verdict, verdict
 
 
@@ -82,18 +82,18 @@ def test_compound_singularities(name: str, q: list[float]) -> None:
     ],
 )
 def test_joints_called_free_do_move(name: str, q: list[float]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
-    target = goal(task, screw, np.radians([q])).array()
+    target = goal_of_joints(task, screw, np.radians([q])).array()
     s = armkin.ik(arm, target)
     assert s.status == Status.SINGULAR
     assert s.free.any()
-    assert truth.idle(screw, s, target) == []
+    assert truth.idle_free_joints(screw, s, target) == []
 
 
 @pytest.mark.parametrize("q", [[0, -90, 0, -90, 0, 90], [180, 180, 0, 180, 180, 180], [-90, -90, 0, 0, 180, -90]])
 def test_compound_singularities_of_a_ur5e(q: list[float]) -> None:
-    arm = shipped("ur5e")[0]
+    arm = shipped_arm("ur5e")[0]
     joints = np.radians(q)
     s = armkin.ik(arm, armkin.fk(arm, joints))
     assert s.status in (Status.SINGULAR, Status.BOUNDARY)  # stretched straight up it cannot move
@@ -125,14 +125,14 @@ def test_singular_pencils_of_right_angled_arms(
     seed: int, q: list[float], closed: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """What the elimination finds for the target itself is no proof that there is nothing."""
-    arm, screw, *_ = case(right_angles(np.random.default_rng(seed)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(seed)), "pose")
     arm = replace(arm)  # its solver is kept by arm, and others of this process have the same one
     if not closed:
         monkeypatch.setattr(anywhere, "_Loop", SimpleNamespace(of=lambda *_: None))
     task, geometry = solver(arm, "pose")
     assert (geometry.name == "general elimination") != closed
     joints = np.radians([q])
-    target = goal(task, screw, joints).array()
+    target = goal_of_joints(task, screw, joints).array()
     for near in (None, joints):
         verdict = truth.judge(arm, screw, "pose", joints, target, near)
         truth.ask_oracle(arm, screw, verdict, target, np.arange(1), 60, 1)
@@ -151,7 +151,7 @@ def test_singular_pencils_of_right_angled_arms(
 )
 def test_a_tool_that_points_straight_down_by_its_axis(q: list[float], count: int) -> None:
     """An SO-101 turns about a vertical tool: what is listed does not depend on where it stands."""
-    arm, _ = shipped("so101")
+    arm, _ = shipped_arm("so101")
     joints = np.radians(q)
     T = armkin.fk(arm, joints)
     for near in (None, joints):
@@ -163,7 +163,7 @@ def test_a_tool_that_points_straight_down_by_its_axis(q: list[float], count: int
 
 def test_a_tool_along_parallel_axes_by_its_axis() -> None:
     """An SO-100: joints 2, 3 and 4 move by themselves on either side; one side was lost, and complete true."""
-    arm, _ = shipped("so100")
+    arm, _ = shipped_arm("so100")
     joints = np.radians([120, 0, -150, -60, 0])
     T = armkin.fk(arm, joints)
     for near in (None, joints):
@@ -177,7 +177,7 @@ def test_poses_of_three_joints_of_which_two_are_in_one_line(q: list[float]) -> N
     """Axes 1 and 3 coincide: ten postures of their self-motion were isolated branches, and the answer complete."""
     right = {"alpha": 90, "a": 100, "d": 0, "theta": 0}
     rows = [right, right, {"alpha": 0, "a": 100, "d": 0, "theta": 0}]
-    arm, *_ = case({"convention": "standard", "joints": [{"dh": row} for row in rows]}, "pose")
+    arm, *_ = case_of({"convention": "standard", "joints": [{"dh": row} for row in rows]}, "pose")
     s = armkin.ik(arm, armkin.fk(arm, np.radians(q)), "pose")
     assert s.status == Status.SINGULAR
     assert s.free.tolist() == [True, False, True]
@@ -188,9 +188,9 @@ def test_poses_of_three_joints_of_which_two_are_in_one_line(q: list[float]) -> N
 
 
 def test_a_pose_that_only_a_moved_target_settled_is_not_complete() -> None:
-    arm, screw, *_ = case(right_angles(np.random.default_rng(80)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(80)), "pose")
     task, _ = solver(arm, "pose")
-    s = armkin.ik(arm, goal(task, screw, np.radians([[0, 90, 0, -90, -90, 0]])).array(), "pose")
+    s = armkin.ik(arm, goal_of_joints(task, screw, np.radians([[0, 90, 0, -90, -90, 0]])).array(), "pose")
     assert s.status[0] == Status.SINGULAR
     assert s.free[0].tolist() == [False, True, True, True, False, True]
     assert s.valid.sum() == 3

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import truth
-from geometries import case, right_angles
-from oracle import goal, weakness
-from test_every_branch import shipped
+from geometries import case_of, right_angles
+from oracle import goal_of_joints, weakness
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -16,23 +16,23 @@ from armkin.inverse.solvers.recognise import solver
 
 def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:
     """Where another one crosses, postures 1e-6 rad beside it solve the target to rounding."""
-    arm, screw, *_ = case(right_angles(np.random.default_rng(168)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(168)), "pose")
     task, _ = solver(arm, "pose")
     q = np.array([[1.94395758534494, -0.2752189104766, 1.68745465008634, 9.1e-11, 1.93145804841238, 0.17129731932685]])
     for near in (None, q):
-        verdict = truth.judge(arm, screw, "pose", q, goal(task, screw, q).array(), near)
+        verdict = truth.judge(arm, screw, "pose", q, goal_of_joints(task, screw, q).array(), near)
         assert verdict, verdict
         assert verdict.solutions.free[0].tolist() == [False, False, True, False, True, False]
-    assert armkin.ik(arm, goal(task, screw, q).array(), "pose").valid.sum() == 2
+    assert armkin.ik(arm, goal_of_joints(task, screw, q).array(), "pose").valid.sum() == 2
 
 
 @pytest.mark.parametrize("q", [[0, 0, -90, -90, 180, -90], [-135, 180, -90, -45, 0, 45], [-90, -90, -90, 0, 90, 180]])
 def test_self_motions_that_meet_are_listed_once_each_and_none_by_its_corner(q: list[float]) -> None:
     """Two of joints 1 and 4 and two of joints 2 and 5, which cross four times: their corners were listed instead."""
-    arm, screw = shipped("fanuc_crx10ia")
+    arm, screw = shipped_arm("fanuc_crx10ia")
     task, _ = solver(arm, "pose")
     joints = np.radians([q])
-    goals = goal(task, screw, joints)
+    goals = goal_of_joints(task, screw, joints)
     for near in (None, joints):
         verdict = truth.judge(arm, screw, "pose", joints, goals.array(), near)
         assert verdict, verdict
@@ -59,21 +59,21 @@ def test_self_motions_that_meet_are_listed_once_each_and_none_by_its_corner(q: l
     ],
 )
 def test_a_wrist_is_in_line_somewhere_on_a_self_motion_of_the_shoulder(seed: int, q: list[float]) -> None:
-    arm, screw, *_ = case(right_angles(np.random.default_rng(seed)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(seed)), "pose")
     task, geometry = solver(arm, "pose")
     assert geometry.name == "spherical wrist"
     joints = np.radians([q])
-    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    verdict = truth.judge(arm, screw, "pose", joints, goal_of_joints(task, screw, joints).array())
     assert verdict, verdict
 
 
 @pytest.mark.parametrize("q", [[-90, 90, 180, -90, 0, 90], [180, 90, 90, -90, -90, -90], [0, 90, 135, -90, -90, -90]])
 def test_a_self_motion_of_two_dimensions_that_meets_another(q: list[float]) -> None:
     """Five axes through one point: joints 2 and 6, 3 and 5 move in pairs, and where joint 2 is at 90 joints 1, 3, 5."""
-    arm, screw, *_ = case(right_angles(np.random.default_rng(3152)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(3152)), "pose")
     task, _ = solver(arm, "pose")
     joints = np.radians([q])
-    target = goal(task, screw, joints).array()
+    target = goal_of_joints(task, screw, joints).array()
     for near in (None, joints):
         verdict = truth.judge(arm, screw, "pose", joints, target, near)
         assert verdict, verdict
@@ -83,10 +83,10 @@ def test_a_self_motion_of_two_dimensions_that_meets_another(q: list[float]) -> N
 @pytest.mark.parametrize("q", [[-90, 0, -90, 90, -90, 0], [180, 180, 90, -90, -90, -90]])
 def test_two_axes_in_line_where_three_directions_are_lost(q: list[float]) -> None:
     """Joints 3 and 5 turn about one line: of all directions lost that one alone holds the joints beside these."""
-    arm, screw, *_ = case(right_angles(np.random.default_rng(2385)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(2385)), "pose")
     task, _ = solver(arm, "pose")
     joints = np.radians([q])
-    verdict = truth.judge(arm, screw, "pose", joints, goal(task, screw, joints).array())
+    verdict = truth.judge(arm, screw, "pose", joints, goal_of_joints(task, screw, joints).array())
     assert verdict, verdict
     assert verdict.solutions.free[0].tolist() == [False, False, True, False, True, False]
 
@@ -95,7 +95,7 @@ def test_a_folded_arm_of_equal_links_beside_its_kite() -> None:
     """Joints 2 and 4 alone move the folded arm; it meets the four-bar motion that moves joints 3 and 6 as well."""
     rows = zip([90, 0, 0, 90, -90, 0], [0, -200, -200, 0, 0, 0], [100, 0, 0, 100, 100, 100], strict=True)
     joints = [{"dh": {"alpha": alpha, "a": a, "d": d, "theta": 0}} for alpha, a, d in rows]
-    arm = case({"convention": "standard", "joints": joints}, "pose").arm
+    arm = case_of({"convention": "standard", "joints": joints}, "pose").arm
     target = armkin.fk(arm, np.radians([0.0, 90.0, 180.0, 0.0, 0.0, 180.0]))
     for near in ([0.0, 0.0, 0.0, 0.0, 0.0, 0.0], [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]):
         s = armkin.ik(arm, target, near=np.radians(near))
@@ -105,7 +105,7 @@ def test_a_folded_arm_of_equal_links_beside_its_kite() -> None:
 
 def test_self_motions_that_cross_are_found_from_anywhere() -> None:
     """Joint 1 turns with the wrist; where the wrist is straight joints 4 and 6 turn. From some 4 of 8 were found."""
-    arm, _ = shipped("wx250s")
+    arm, _ = shipped_arm("wx250s")
     target = armkin.fk(arm, np.radians([0.0, 90.0, 90.0, 90.0, 180.0, 0.0]))
     near = np.radians([[47, -79, -158, -166, 108, 142], [123, -160, 79, -112, 125, 14], [32, -56, -37, 134, -94, 42]])
     for posture in near:
@@ -114,7 +114,7 @@ def test_self_motions_that_cross_are_found_from_anywhere() -> None:
 
 def test_a_self_motion_that_hardly_turns_joint_6_is_listed_once() -> None:
     """Axes 1 and 4 all but in one line: while they turn by 57 degrees joint 6 turns by 0.07, and there were two."""
-    arm, _ = shipped("irb2400")
+    arm, _ = shipped_arm("irb2400")
     q = [-15.117339140, -160.561638794, -109.409431080, -58.906870688, -21.966855012, 96.853237894]
     s = armkin.ik(arm, armkin.fk(arm, np.radians(q)))
     assert s.status == Status.SINGULAR

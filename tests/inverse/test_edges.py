@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import examine, random_joints
-from geometries import CLASSES, Case, case, random_case
-from oracle import distance, forward, goal, missing, screws
+from checks import examine_answers, random_joints
+from geometries import CLASSES, Case, case_of, random_case
+from oracle import distance, forward, goal_of_joints, pose_error, screws_of
 
 import armkin
 from armkin import Status
@@ -22,11 +22,11 @@ ROBOTS = Path(__file__).parents[2] / "robots"
 QUARTER = np.pi / 2
 
 
-def load(name: str) -> armkin.Arm:
+def load_robot(name: str) -> armkin.Arm:
     return armkin.load(ROBOTS / f"{name}.yaml")
 
 
-def free(s: armkin.Solutions) -> list[str]:
+def free_joints(s: armkin.Solutions) -> list[str]:
     return [name for name, loose in zip(s.arm.joint_names, s.free, strict=True) if loose]
 
 
@@ -56,9 +56,9 @@ def free(s: armkin.Solutions) -> list[str]:
     ],
 )
 def test_status(name: str, target: list[float], status: Status, joints: list[str], count: int) -> None:
-    s = armkin.ik(load(name), target)
+    s = armkin.ik(load_robot(name), target)
     assert s.status == status
-    assert free(s) == joints
+    assert free_joints(s) == joints
     assert s.valid.sum() == count
     if count:
         assert s.residual()[0][s.valid].max() < 1e-9 * s.arm.reach  # home solves one of them so far
@@ -68,7 +68,7 @@ def test_status(name: str, target: list[float], status: Status, joints: list[str
 @pytest.mark.parametrize(("beyond", "reached"), [(1e-12, True), (5e-10, True), (3e-9, False)])
 def test_just_beyond_the_boundary(name: str, beyond: float, reached: bool) -> None:
     """Less than 1e-9 of the reach outside is answered, with its residual; more is not."""
-    arm = load(name)
+    arm = load_robot(name)
     target = [860 + arm.reach * beyond, 0, 660] if name == "yaw_two_link" else [500 + arm.reach * beyond, 0]
     s = armkin.ik(arm, target)
     if reached:
@@ -95,7 +95,7 @@ def test_just_beyond_the_boundary(name: str, beyond: float, reached: bool) -> No
     ],
 )
 def test_a_wrist_singularity_is_a_self_motion(name: str, joint: int, loose: list[int], curves: int) -> None:
-    arm = load(name)
+    arm = load_robot(name)
     q = np.array([0.3, -1.0, 1.2, -0.4, 0.0, 0.7])
     if name == "stanford":
         q[1:3] = 0.5, 400
@@ -113,23 +113,23 @@ def test_a_wrist_singularity_is_a_self_motion(name: str, joint: int, loose: list
 
 def test_singular_answers_move_the_free_joint_least() -> None:
     """A target on the base axis: joint 1 stays where `near` has it."""
-    arm = load("yaw_two_link")
+    arm = load_robot("yaw_two_link")
     s = armkin.ik(arm, [[0, 0, 900]] * 2, near=np.array([[0.7, 0, 0], [-0.2, 0, 0]]))
     np.testing.assert_allclose(np.cos(s.q[:, :2, 0] - [[0.7], [-0.2]]) ** 2, 1.0, atol=1e-12)
 
 
 def test_tangent_roots_come_once() -> None:
     """Straight elbows: the double root is one branch, and the other branches stay."""
-    arm = load("labvolt_5150")
-    screw = screws(arm.file)
+    arm = load_robot("labvolt_5150")
+    screw = screws_of(arm.file)
     q = np.random.default_rng(1).uniform(-3, 3, (300, 5))
     q[:, 2] = 0.0
     task, _ = solver(arm, None)
-    goals = goal(task, screw, q)
+    goals = goal_of_joints(task, screw, q)
     s = armkin.ik(arm, goals.array())
     assert (s.status == Status.BOUNDARY).all()
     rows, columns = np.nonzero(s.valid)
-    mm, rad = missing(screw, goals.take(rows), s.q[rows, columns])
+    mm, rad = pose_error(screw, goals.take(rows), s.q[rows, columns])
     assert mm.max() < 1e-9
     assert rad.max() < 1e-11
     straight = np.abs(np.sin(s.q[:, :, 2])) < 1e-4
@@ -172,11 +172,11 @@ def test_double_roots_of_random_arms_are_kept(seed: int, sample: Callable[[int, 
 @pytest.mark.parametrize("name", ["PRP", "RPP", "PPR"])
 def test_arms_that_move_a_point_in_a_plane_are_refused(name: str) -> None:
     """Three joints, two degrees of freedom: every answer would be one of a curve."""
-    from geometries import AXIS, case, spatial
+    from geometries import AXIS, case_of, random_screws
 
     plane = {"PRP": "xzy", "RPP": "zxy", "PPR": "xyz"}[name]
     rng = np.random.default_rng(0)
-    arm = case(spatial(rng, name, [AXIS[k] for k in plane], [None] * 3), "xyz").arm
+    arm = case_of(random_screws(rng, name, [AXIS[k] for k in plane], [None] * 3), "xyz").arm
     with pytest.raises(UsageError, match="can meet 2 at a time"):
         armkin.ik(arm, armkin.fk(arm, rng.uniform(-1, 1, (20, 3)))[:, :3, 3], "xyz")
 
@@ -184,25 +184,25 @@ def test_arms_that_move_a_point_in_a_plane_are_refused(name: str) -> None:
 @pytest.mark.parametrize(("kinds", "task"), [("RRR", "xyz"), ("PPPPPP", "pose"), ("RRRRRR", "pose")])
 def test_arms_whose_axes_are_all_parallel_are_refused(kinds: str, task: str) -> None:
     """Such an arm reaches its own poses, on curves of solutions: 'unreachable' or 'complete' would be wrong."""
-    from geometries import AXIS, case, spatial
+    from geometries import AXIS, case_of, random_screws
 
     rng = np.random.default_rng(0)
     n = len(kinds)
-    arm = case(spatial(rng, kinds, [AXIS["z"]] * n, [None] * n), task).arm
+    arm = case_of(random_screws(rng, kinds, [AXIS["z"]] * n, [None] * n), task).arm
     with pytest.raises(UsageError, match="infinitely many solutions or none"):
         armkin.ik(arm, armkin.fk(arm, arm.home) if task == "pose" else [1, 2, 3], task)
 
 
 def test_an_unreachable_pose_of_a_general_arm_of_few_joints() -> None:
     """No branch at all leaves no branch to name."""
-    from geometries import AXIS, case, spatial
+    from geometries import AXIS, case_of, random_screws
 
-    arm = case(spatial(np.random.default_rng(0), "RR", [AXIS["z"], AXIS["x"]], [None] * 2), "pose").arm
+    arm = case_of(random_screws(np.random.default_rng(0), "RR", [AXIS["z"], AXIS["x"]], [None] * 2), "pose").arm
     far = np.eye(4)
     far[:3, 3] = 1e9
     s = armkin.ik(arm, far, "pose")
     assert (int(s.status), bool(s.valid.any())) == (Status.UNREACHABLE, False)
-    six = case(spatial(np.random.default_rng(0), "RRRRRR", [None] * 6, [None] * 6), "pose").arm
+    six = case_of(random_screws(np.random.default_rng(0), "RRRRRR", [None] * 6, [None] * 6), "pose").arm
     assert not armkin.ik(six, far, "pose").valid.any()
 
 
@@ -215,10 +215,10 @@ def test_slides_far_longer_than_the_links(name: str, sample: Callable[[int, int]
         shape = (sample(200, 200 if c.arm.n < 5 else 24), c.arm.n)
         turn = np.where(rng.random(shape) < 0.3, rng.uniform(-3, 3, shape), rng.integers(-1, 3, shape) * np.pi / 2)
         q = np.where(c.screw.prismatic, c.arm.reach * rng.uniform(-12, 12, shape), turn)
-        report = examine(c.arm, c.screw, c.task, q)
+        report = examine_answers(c.arm, c.screw, c.task, q)
         assert not (report.lost & (report.solutions.status != Status.SINGULAR)).any()
         q = np.where(c.screw.prismatic, 100 * q, q)[: sample(200, 16)]
-        assert not examine(c.arm, c.screw, c.task, q).solutions.complete.all()
+        assert not examine_answers(c.arm, c.screw, c.task, q).solutions.complete.all()
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_slides_far_longer_than_the_links(name: str, sample: Callable[[int, int]
 def test_neighbours_of_weak_jacobians_are_no_self_motion(name: str, seed: int, sample: int) -> None:
     """Among 50,000 random poses a few have isolated branches at singular values below 1e-6."""
     case = random_case(name, seed)
-    report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 50_000, sample))
+    report = examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 50_000, sample))
     assert report.weak.min() < 1e-6
     assert not report.lost.any()
 
@@ -249,7 +249,7 @@ def special_arms(count: int, seed: int) -> Iterator[Case]:
             }
             for kind in rng.choice(["revolute", "prismatic"], 3, p=[0.6, 0.4])
         ]
-        special = case({"convention": "standard", "joints": rows}, "xyz")
+        special = case_of({"convention": "standard", "joints": rows}, "xyz")
         with suppress(UsageError):  # its joints cannot place a point
             solver(special.arm, "xyz")
             count -= 1
@@ -262,7 +262,9 @@ def test_round_angles_and_lengths(sample: Callable[[int, int], int]) -> None:
     for c in special_arms(sample(200, 60), 2):
         q = rng.integers(-1, 3, (40, 3)) * QUARTER
         q = np.where(rng.random((40, 3)) < 0.3, rng.uniform(-3, 3, (40, 3)), q)
-        report = examine(c.arm, c.screw, "xyz", np.where(c.screw.prismatic, rng.integers(-2, 3, (40, 3)) * 50.0, q))
+        report = examine_answers(
+            c.arm, c.screw, "xyz", np.where(c.screw.prismatic, rng.integers(-2, 3, (40, 3)) * 50.0, q)
+        )
         s = report.solutions
         distances = distance(c.screw, s.q, report.q[:, None]).min(axis=1)
         assert not ((s.status != Status.SINGULAR) & (distances > np.where(report.weak < 1e-6, 2e-2, 1e-6))).any()
@@ -275,7 +277,7 @@ def test_two_slides_that_become_parallel() -> None:
         {"dh": {"alpha": 30, "a": 100, "d": 100, "theta": 180}},
         {"dh": {"alpha": 45, "a": 200, "d": 0, "theta": 90}, "type": "prismatic"},
     ]
-    arm = case({"convention": "standard", "joints": rows}, "xyz").arm
+    arm = case_of({"convention": "standard", "joints": rows}, "xyz").arm
     s = armkin.ik(arm, armkin.fk(arm, [100, 0, 100])[:3, 3])
     assert (int(s.status), s.free.tolist(), int(s.valid.sum())) == (Status.SINGULAR, [True, False, True], 1)
 
@@ -286,13 +288,13 @@ def test_no_target_is_too_odd() -> None:
         v * np.array([x, y, z]) for v in (0.0, 1.0, 100.0, 1e6, 1e12) for x in (0, 1) for y in (0, -1) for z in (0, 1)
     ]
     for name in ("three_dof", "yaw_two_link"):
-        s = armkin.ik(load(name), targets)
+        s = armkin.ik(load_robot(name), targets)
         assert np.isfinite(s.q[s.valid]).all()
         assert s.valid.any(axis=1).tolist() == (s.status != Status.UNREACHABLE).tolist()
     for name in ("puma560", "ur5e", "stanford", "jaco_j2n6s300"):
         T = np.tile(np.eye(4), (len(targets), 1, 1))
         T[:, :3, 3] = targets
-        s = armkin.ik(load(name), T)
+        s = armkin.ik(load_robot(name), T)
         assert np.isfinite(s.q[s.valid]).all()
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 import truth
-from geometries import Case, case, random_case, right_angles
-from oracle import goal
+from geometries import Case, case_of, random_case, right_angles
+from oracle import goal_of_joints
 
 import armkin
 from armkin.inverse.elimination import method, passes, polish, roots
@@ -19,8 +19,8 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.model.rotation import inverse
 
 
-def built(seed: int) -> Case:
-    return case(right_angles(np.random.default_rng(seed)), "pose")
+def right_angled_case(seed: int) -> Case:
+    return case_of(right_angles(np.random.default_rng(seed)), "pose")
 
 
 @pytest.mark.parametrize("seed", [151, 169, 188, 5006])
@@ -29,10 +29,10 @@ def test_random_poses_of_right_angled_arms_are_complete(seed: int) -> None:
 
     Of arm 5006 a complex pair that is real to 1e-4 with one in thirty.
     """
-    arm, screw, task = built(seed)
+    arm, screw, task = right_angled_case(seed)
     assert armkin.method(arm, task)[0] == "general elimination"
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (300, 6))
-    target = goal(solver(arm, task)[0], screw, q).array()
+    target = goal_of_joints(solver(arm, task)[0], screw, q).array()
     verdict = truth.judge(arm, screw, task, q, target)
     truth.ask_oracle(arm, screw, verdict, target, np.arange(12), 250, 3)
     assert verdict, str(verdict)
@@ -43,7 +43,7 @@ def test_random_poses_of_right_angled_arms_are_complete(seed: int) -> None:
 def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytest.MonkeyPatch) -> None:
     # the distance of every root from the others
     monkeypatch.setattr(roots, "tol", SimpleNamespace(**{**vars(tolerances), "NO_PRODUCT": -1.0}))
-    arm = (built(name) if isinstance(name, int) else random_case(name, 1)).arm
+    arm = (right_angled_case(name) if isinstance(name, int) else random_case(name, 1)).arm
     elimination = method.prepare(arm.link, arm.prismatic)
     closed = elimination.loop
     q = np.random.default_rng(5).uniform(-np.pi, np.pi, (200, 6)) * np.where(arm.prismatic, 100.0, 1.0)

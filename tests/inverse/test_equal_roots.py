@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import truth
-from geometries import case, right_angles
-from oracle import goal
-from test_every_branch import shipped
+from geometries import case_of, right_angles
+from oracle import goal_of_joints
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -16,16 +16,16 @@ from armkin.inverse.elimination import equal_roots
 from armkin.inverse.solvers.recognise import solver
 
 
-def powers(q: complex) -> Array:
+def half_powers(q: complex) -> Array:
     f = q / 2
     return np.array([np.cos(3 * f), np.sin(3 * f), np.cos(f), np.sin(f)])
 
 
-def product(q: complex, k: complex, wide: bool) -> Array:
-    return np.outer(powers(q), powers(k) if wide else [1.0, np.cos(k), np.sin(k)])
+def outer_product(q: complex, k: complex, wide: bool) -> Array:
+    return np.outer(half_powers(q), half_powers(k) if wide else [1.0, np.cos(k), np.sin(k)])
 
 
-def mixed(vectors: list[Array], weights: Array) -> Array:
+def mix_products(vectors: list[Array], weights: Array) -> Array:
     """Matrices (1, d, 4, 3 or 4) that span the same space, orthonormal."""
     flat = weights @ np.stack([v.ravel() for v in vectors])
     return np.linalg.qr(flat.T)[0].T.reshape(1, len(vectors), *vectors[0].shape)
@@ -46,9 +46,9 @@ def mixed(vectors: list[Array], weights: Array) -> Array:
 )
 def test_all_products_come_back_from_any_mixture(solutions: list[tuple[float, float]], wide: bool) -> None:
     rng = np.random.default_rng(0)
-    products = [product(*solution, wide) for solution in solutions]
+    products = [outer_product(*solution, wide) for solution in solutions]
     for _ in range(20):
-        v = mixed(products, rng.normal(size=(len(products), len(products))))
+        v = mix_products(products, rng.normal(size=(len(products), len(products))))
         weights, real, good = equal_roots.products(v)
         assert good.all()
         assert real.all()
@@ -61,12 +61,12 @@ def test_all_products_come_back_from_any_mixture(solutions: list[tuple[float, fl
 @pytest.mark.parametrize("wide", [False, True])
 def test_complex_solutions_are_told_and_others_are_left(wide: bool) -> None:
     rng = np.random.default_rng(1)
-    z = product(0.3 + 0.4j, -1.2 + 0.2j, wide)  # of two complex solutions real and imaginary part are in the span
-    real, good = equal_roots.products(mixed([z.real, z.imag], rng.normal(size=(2, 2))))[1:]
+    z = outer_product(0.3 + 0.4j, -1.2 + 0.2j, wide)  # of two complex solutions real and imaginary part are in the span
+    real, good = equal_roots.products(mix_products([z.real, z.imag], rng.normal(size=(2, 2))))[1:]
     assert good.all()
     assert not real.any()
-    z = product(0.3 + 1e-6j, -1.2 + 1e-6j, wide)  # two real ones, or two complex ones: rounding hides which
-    assert not equal_roots.products(mixed([z.real, 1e6 * z.imag], rng.normal(size=(2, 2))))[2].any()
+    z = outer_product(0.3 + 1e-6j, -1.2 + 1e-6j, wide)  # two real ones, or two complex ones: rounding hides which
+    assert not equal_roots.products(mix_products([z.real, 1e6 * z.imag], rng.normal(size=(2, 2))))[2].any()
 
 
 def test_groups_are_equal_roots_of_one_pose() -> None:
@@ -78,15 +78,15 @@ def test_groups_are_equal_roots_of_one_pose() -> None:
 
 def test_round_postures_that_share_a_joint_are_complete() -> None:
     """A CRX-10iA at 200 postures of multiples of 90 degrees: of 37 regular ones 30 were left open, 7 are."""
-    arm, screw = shipped("fanuc_crx10ia")
+    arm, screw = shipped_arm("fanuc_crx10ia")
     task, _ = solver(arm, None)
     q = truth.round_postures(arm, 90, 200, seed=2)
-    solutions = armkin.ik(arm, goal(task, screw, q).array())
+    solutions = armkin.ik(arm, goal_of_joints(task, screw, q).array())
     regular = np.flatnonzero(solutions.status == Status.EXACT)
     assert len(regular) > 30
     assert solutions.complete[regular].mean() > 0.8
     q = q[regular]
-    target = goal(task, screw, q).array()
+    target = goal_of_joints(task, screw, q).array()
     verdict = truth.judge(arm, screw, None, q, target)
     truth.ask_oracle(arm, screw, verdict, target, np.arange(0, len(q), 3), 250, 3)
     assert verdict, verdict
@@ -97,10 +97,10 @@ def test_solutions_that_differ_in_the_end_joints_alone_are_one_root_and_not_forg
 
     Two double roots gave four of these, and no more were said to be there: six listed, complete true.
     """
-    arm, screw, *_ = case(right_angles(np.random.default_rng(5)), "pose")
+    arm, screw, *_ = case_of(right_angles(np.random.default_rng(5)), "pose")
     task, _ = solver(arm, "pose")
     q = np.radians([[-90, 0, 0, 90, -90, 90]])
-    verdict = truth.judge(arm, screw, "pose", q, goal(task, screw, q).array())
+    verdict = truth.judge(arm, screw, "pose", q, goal_of_joints(task, screw, q).array())
     assert verdict, verdict
     assert verdict.solutions.valid.sum() == 8
 

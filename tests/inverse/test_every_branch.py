@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import Report, examine, not_found, random_joints
+from checks import Report, examine_answers, not_found, random_joints
 from geometries import CLASSES, random_case
-from oracle import Screws, exponential, forward, screws
+from oracle import Screws, exponential, forward, screws_of
 
 import armkin
 from armkin.model.arm import Arm
@@ -47,7 +47,7 @@ BRANCHES = {
 }
 
 
-def check(report: Report) -> None:
+def check_report(report: Report) -> None:
     """Nothing lost, nothing false, nothing twice."""
     s = report.solutions
     assert not report.lost.any(), f"{report.lost.sum()} lost, the first: {report.q[report.lost][0]}"
@@ -60,16 +60,16 @@ def check(report: Report) -> None:
 
 
 @cache
-def shipped(name: str) -> tuple[Arm, Screws]:
+def shipped_arm(name: str) -> tuple[Arm, Screws]:
     """The same arm each time, as what is prepared of it is kept by arm."""
     arm = armkin.load(ROBOTS / f"{name}.yaml")
-    screw = screws(arm.file)
+    screw = screws_of(arm.file)
     if arm.n == 7:  # one of the joints is held
-        return armkin.lock(arm, {"J3": 0.35}), locked(screw, 2, 0.35)
+        return armkin.lock(arm, {"J3": 0.35}), lock_screws(screw, 2, 0.35)
     return arm, screw
 
 
-def locked(screw: Screws, joint: int, value: float) -> Screws:
+def lock_screws(screw: Screws, joint: int, value: float) -> Screws:
     """The screws of what is left when one joint is held."""
     E = exponential(screw, joint, np.array(value))
     w, p = screw.w.copy(), screw.p.copy()
@@ -92,18 +92,18 @@ def between_axes(screw: Screws) -> tuple[list[bool], list[float], list[bool]]:
 
 @pytest.mark.parametrize("name", ALIKE)
 def test_arms_called_alike_are(name: str) -> None:
-    first, second = (between_axes(shipped(arm_name)[1]) for arm_name in (name, ALIKE[name]))
+    first, second = (between_axes(shipped_arm(arm_name)[1]) for arm_name in (name, ALIKE[name]))
     assert (first[0], first[2]) == (second[0], second[2])
     np.testing.assert_allclose(first[1], second[1], atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_shipped_robots(name: str, sample: Callable[[int, int], int]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     q = random_joints(screw, sample(SLOW.get(name, 10_000), 3000), 1)
     np.testing.assert_allclose(armkin.fk(arm, q), forward(screw, q), atol=1e-9)
-    report = examine(arm, screw, None, q)
-    check(report)
+    report = examine_answers(arm, screw, None, q)
+    check_report(report)
     # the Gen3's wrist misses its centre by 0.35 mm: seeds of the near class, which claims no completeness
     assert report.solutions.complete.mean() > 0.8 or report.solutions.method.startswith("near")
     if name in BRANCHES:
@@ -114,8 +114,8 @@ def test_shipped_robots(name: str, sample: Callable[[int, int], int]) -> None:
 
 @pytest.mark.parametrize("name", [name for name in NAMES if name not in SLOW])
 def test_shipped_robots_against_the_oracle(name: str) -> None:
-    arm, screw = shipped(name)
-    report = examine(arm, screw, None, random_joints(screw, 12, 3))
+    arm, screw = shipped_arm(name)
+    report = examine_answers(arm, screw, None, random_joints(screw, 12, 3))
     assert not not_found(report, np.arange(12), 100 if arm.n < 5 else 250, 4)
 
 
@@ -128,7 +128,7 @@ SEEDS = 5, 2  # with --long, in the gate; `tests/bench/check_ik.py --classes` ha
 def test_random_arms(name: str, sample: Callable[[int, int], int]) -> None:
     for seed in range(sample(*SEEDS)):
         case = random_case(name, seed)
-        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 40, seed)))
+        check_report(examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 40, seed)))
 
 
 def is_special(name: str) -> bool:
@@ -140,8 +140,8 @@ def test_random_arms_with_six_joints(name: str, sample: Callable[[int, int], int
     eliminated = 0
     for seed in range(sample(*SEEDS)):
         case = random_case(name, seed)
-        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
-        check(report)
+        report = examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 20, seed))
+        check_report(report)
         s = report.solutions  # two of the arms happen to be within 1e-5 of a more special one
         eliminated += s.method == "general elimination" and "named after that class" not in s.why
     assert eliminated <= (1 if name.startswith("three") else 0)  # an arm of which the quartic is ill-conditioned
@@ -151,14 +151,14 @@ def test_random_arms_with_six_joints(name: str, sample: Callable[[int, int], int
 def test_random_arms_for_the_elimination(name: str) -> None:
     for seed in range(3):
         case = random_case(name, 100 + seed)
-        check(examine(case.arm, case.screw, case.task, random_joints(case.screw, 30, seed)))
+        check_report(examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 30, seed)))
 
 
 @pytest.mark.parametrize("name", sorted(set(CLASSES) - COSTLY))
 def test_random_arms_against_the_oracle(name: str, sample: Callable[[int, int], int]) -> None:
     for seed in range(sample(3, 1)):
         case = random_case(name, 200 + seed)
-        report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 10, seed))
+        report = examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 10, seed))
         assert not not_found(report, np.arange(10), 60, seed)
 
 
@@ -169,5 +169,5 @@ def test_random_arms_against_the_oracle(name: str, sample: Callable[[int, int], 
 ])  # fmt: skip
 def test_random_arms_with_six_joints_against_the_oracle(name: str) -> None:
     case = random_case(name, 300)
-    report = examine(case.arm, case.screw, case.task, random_joints(case.screw, 12, 1))
+    report = examine_answers(case.arm, case.screw, case.task, random_joints(case.screw, 12, 1))
     assert not not_found(report, np.arange(12), 250, 2)

@@ -8,14 +8,14 @@ import exact_postures
 import numpy as np
 import pytest
 import truth
-from geometries import Case, case
-from oracle import distance, goal
+from geometries import Case, case_of
+from oracle import distance, goal_of_joints
 
 import armkin
 from armkin import Status
 from armkin.inverse.solvers.recognise import solver
 
-POSTURES = exact_postures.read()
+POSTURES = exact_postures.read_postures()
 REACH = 0.1  # [rad, reaches] how far a component reaches that is no manifold: docs/solution.md
 
 
@@ -28,7 +28,7 @@ def arm_of(name: str) -> Case:
         }
         for kind, (d, a, alpha) in zip(kinds, table, strict=True)
     ]
-    return case({"convention": "standard", "joints": rows}, task)
+    return case_of({"convention": "standard", "joints": rows}, task)
 
 
 def test_there_are_2000_of_every_kind() -> None:
@@ -40,7 +40,7 @@ def test_there_are_2000_of_every_kind() -> None:
 def test_the_file_is_what_its_script_computes() -> None:
     field = exact_postures.Field(exact_postures.PRIMES[0])
     for row in POSTURES[::97]:
-        assert exact_postures.structure(field, row.arm, row.angles) == row
+        assert exact_postures.posture_structure(field, row.arm, row.angles) == row
 
 
 @pytest.mark.parametrize("name", exact_postures.ARMS)
@@ -48,7 +48,7 @@ def test_the_word_is_what_exact_arithmetic_says(name: str, sample: Callable[[int
     """Simple roots are branches, whatever else the target has; multiple ones boundaries; curves free their joints."""
     c, rows = arm_of(name), [row for row in POSTURES if row.arm == name][:: 3 - sample(2, 1)]
     kinds = exact_postures.ARMS[name][1]
-    q = np.array([exact_postures.joints(kinds, row.angles) for row in rows])
+    q = np.array([exact_postures.joint_values(kinds, row.angles) for row in rows])
     T = armkin.fk(c.arm, q)
     s = armkin.ik(c.arm, T if c.task == "pose" else T[:, :3, 3], c.task)
     away = distance(c.screw, s.q, q[:, None]).min(axis=1, initial=np.inf)
@@ -60,8 +60,8 @@ def test_the_word_is_what_exact_arithmetic_says(name: str, sample: Callable[[int
         elif row.multiplicity:
             good = (status == Status.BOUNDARY and away[k] < REACH) or status == Status.SINGULAR
         elif row.lost > 1 and status == Status.BOUNDARY:  # curves that cross may be complex: x^2 + y^2 = 0 is one point
-            goals = goal(solver(c.arm, c.task)[0], c.screw, q[[k]])
-            good = away[k] < REACH and not any(truth.movable(c.screw, goals, q[[k]], j).any() for j in range(c.arm.n))
+            goals = goal_of_joints(solver(c.arm, c.task)[0], c.screw, q[[k]])
+            good = away[k] < REACH and not any(truth.can_move(c.screw, goals, q[[k]], j).any() for j in range(c.arm.n))
         else:
             moving = [int(j) - 1 for j in row.moving]
             good = status == Status.SINGULAR and bool(s.free[k, moving].all())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from redundant_arms import covers, held_answers, postures
+from redundant_arms import covers_value, held_answers, redundant_postures
 
 import armkin
 from armkin import Status
@@ -19,7 +19,7 @@ ARMS = [("panda", None), ("iiwa7", None), ("planar_3dof", "xy")]
 @pytest.mark.parametrize(("name", "task"), ARMS)
 def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str | None) -> None:
     arm = armkin.load(name)
-    q, target = postures(arm, task, 60, 3)
+    q, target = redundant_postures(arm, task, 60, 3)
     s = armkin.ik(arm, target, task)
     free = redundancy(arm, task)
     assert free is not None
@@ -28,7 +28,7 @@ def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str |
     assert (s.best >= 0).all()
     for k in range(len(q)):
         legal = s.interval[k][s.within_limits[k]]
-        assert covers(arm, legal, q[k, free.joint]).any()
+        assert covers_value(arm, legal, q[k, free.joint]).any()
     mm, rad = s.residual()
     assert np.nanmax(mm) <= 1e-9 * arm.reach
     assert np.nanmax(rad, initial=0.0) <= 1e-9
@@ -38,7 +38,7 @@ def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str |
 def test_as_many_legal_postures_as_intervals_at_any_value(name: str, task: str | None) -> None:
     """On both sides of each end, 1e-6 degrees from it, and between: as many as the arm with the joint held has."""
     arm = armkin.load(name)
-    _, target = postures(arm, task, 1, 8)
+    _, target = redundant_postures(arm, task, 1, 8)
     s = armkin.ik(arm, target, task)
     free = redundancy(arm, task)
     assert free is not None
@@ -50,13 +50,13 @@ def test_as_many_legal_postures_as_intervals_at_any_value(name: str, task: str |
         for value in [*beside[::9], *(0.5 * (ends[1:] + ends[:-1]))[:3]]:
             if arm.lower[free.joint] <= value <= arm.upper[free.joint]:
                 own = held_answers(arm, free.joint, float(value), target[k], task)
-                assert covers(arm, legal, value, 0.0).sum() == len(own), (k, np.rad2deg(value))
+                assert covers_value(arm, legal, value, 0.0).sum() == len(own), (k, np.rad2deg(value))
 
 
 @pytest.mark.parametrize(("name", "task"), ARMS)
 def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: str | None) -> None:
     arm = armkin.load(name)
-    q, target = postures(arm, task, 1, 9)
+    q, target = redundant_postures(arm, task, 1, 9)
     free = redundancy(arm, task)
     assert free is not None
     s = armkin.ik(arm, target, task)
@@ -100,7 +100,7 @@ def test_no_interval_and_no_gap_is_missed_between_values(seed: int) -> None:
         legal = s.interval[k][s.within_limits[k]]
         ends = legal.ravel()[:, None]
         t = t[(np.abs(np.remainder(t - ends + np.pi, 2 * np.pi) - np.pi) > 2e-8).all(axis=0)]
-        listed = covers(arm, legal[:, None], t, 0.0).sum(axis=0)
+        listed = covers_value(arm, legal[:, None], t, 0.0).sum(axis=0)
         assert (listed == count_over_a_turn(arm, s.target[k], t)).all()
 
 
@@ -108,11 +108,11 @@ def test_no_interval_and_no_gap_is_missed_between_values(seed: int) -> None:
 def test_what_is_shorter_than_a_sample_is_there(number: int, value: float) -> None:
     """Four targets of 600 that lacked an interval or a gap here, of 0.003 to 0.07 degrees: no sample was in it."""
     arm = armkin.load("panda")
-    target = postures(arm, None, 600, 23)[1][number]
+    target = redundant_postures(arm, None, 600, 23)[1][number]
     s = armkin.ik(arm, target)
     assert s.interval is not None
     assert s.complete
-    listed = covers(arm, s.interval[s.within_limits], np.deg2rad(value), 0.0).sum()
+    listed = covers_value(arm, s.interval[s.within_limits], np.deg2rad(value), 0.0).sum()
     assert listed == len(held_answers(arm, 6, float(np.deg2rad(value)), target, None))
 
 
@@ -170,7 +170,7 @@ def test_a_nearly_stretched_arm_has_its_short_families() -> None:
     s = armkin.ik(arm, armkin.fk(arm, np.stack([arm.home + 0.3, q])))
     assert s.interval is not None
     assert (s.best >= 0).all()
-    assert covers(arm, s.interval[1][s.within_limits[1]], q[6]).any()
+    assert covers_value(arm, s.interval[1][s.within_limits[1]], q[6]).any()
 
 
 @pytest.mark.parametrize("joint", [1, 3, 5])
@@ -183,7 +183,7 @@ def test_an_arm_with_an_all_but_straight_joint_loses_no_posture(joint: int, degr
     target = armkin.fk(arm, q)
     s = armkin.ik(arm, target)
     assert s.interval is not None
-    assert all(covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
+    assert all(covers_value(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
     assert np.nanmax(s.residual()) <= 1e-9
     assert s.complete.all() or joint != 3
     assert not s.complete.any() or joint == 3 or degrees  # a straight shoulder or wrist turns by itself
@@ -196,7 +196,7 @@ def test_a_posture_that_only_touches_the_limits_is_an_interval_without_length() 
     q = np.where(np.random.default_rng(1).random((20, 7)) < 0.5, arm.lower, arm.upper)
     s = armkin.ik(arm, armkin.fk(arm, q))
     assert s.interval is not None
-    assert all(covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
+    assert all(covers_value(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any() for k in range(len(q)))
 
 
 def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbow() -> None:
@@ -226,7 +226,7 @@ def test_the_arm_angle_knows_all_families_of_a_class_whatever_its_zeros_and_elbo
     legal = s.interval[0][s.within_limits[0]]
     for value in rng.uniform(-np.pi, np.pi, 8):
         postures = held_answers(turned_arm, 6, float(value), s.target[0], None)
-        assert covers(turned_arm, legal, float(value), 0.0).sum() == len(postures)
+        assert covers_value(turned_arm, legal, float(value), 0.0).sum() == len(postures)
 
 
 def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_interval() -> None:
@@ -242,12 +242,12 @@ def test_a_target_that_only_postures_outside_the_limits_reach_has_no_legal_inter
 def test_intervals_shorter_than_a_sample_are_listed(k: int, degrees: float, count: int) -> None:
     """Beside a merge the other branch is legal for 1e-4 degrees; between two limits one is for 0.06."""
     arm = armkin.load("panda")
-    _, target = postures(arm, None, 12, 5)
+    _, target = redundant_postures(arm, None, 12, 5)
     s = armkin.ik(arm, target[k])
     assert s.interval is not None
     value = float(np.deg2rad(degrees))
     assert len(held_answers(arm, 6, value, target[k], None)) == count
-    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
+    assert covers_value(arm, s.interval[s.within_limits], value, 0.0).sum() == count
 
 
 @pytest.mark.parametrize(
@@ -265,7 +265,7 @@ def test_gaps_and_families_between_two_samples_are_listed(degrees: list[float], 
     s = armkin.ik(arm, target)
     assert s.interval is not None
     postures = held_answers(arm, 6, value, target, None)
-    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == len(postures)
+    assert covers_value(arm, s.interval[s.within_limits], value, 0.0).sum() == len(postures)
 
 
 def axis_targets(arm: armkin.Arm, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -319,7 +319,7 @@ def test_a_tool_beside_the_last_axis_has_families_of_the_first_joint() -> None:
 def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
     """`--compiled` with a task by name was refused: 7 joints for 6 constraints."""
     arm = armkin.load("panda")
-    q, target = postures(arm, None, 2, 7)
+    q, target = redundant_postures(arm, None, 2, 7)
     fast, python = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
     np.testing.assert_allclose(fast.q, python.q, atol=1e-9)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from checks import random_joints
-from oracle import forward, forward_and_jacobian, screws
+from oracle import forward, forward_and_jacobian, screws_of
 
 import armkin
 from armkin.forward import position
@@ -17,7 +17,7 @@ POSES = 10_000
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
 def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
     arm = armkin.load(path)
-    screw = screws(arm.file)
+    screw = screws_of(arm.file)
     q = random_joints(screw, POSES, 6)
     T, J = armkin.fk(arm, q), armkin.jacobian(arm, q)
     expected, jacobian = forward_and_jacobian(screw, q)
@@ -31,7 +31,7 @@ def test_tool_and_jacobian_are_those_of_the_exponentials(path: Path) -> None:
 @pytest.mark.parametrize("path", ROBOTS, ids=lambda path: path.stem)
 def test_frames_begin_at_the_base_and_end_at_the_tool(path: Path) -> None:
     arm = armkin.load(path)
-    screw = screws(arm.file)
+    screw = screws_of(arm.file)
     q = random_joints(screw, 200, 7)
     frames = armkin.frames(arm, q)
     assert frames.shape == (200, arm.n + 2, 4, 4)
@@ -41,7 +41,7 @@ def test_frames_begin_at_the_base_and_end_at_the_tool(path: Path) -> None:
 
 def test_the_jacobian_is_the_derivative() -> None:
     arm = armkin.load(ROBOTS[0].parent / "stanford.yaml")
-    q = random_joints(screws(arm.file), 20, 8)
+    q = random_joints(screws_of(arm.file), 20, 8)
     J, h = armkin.jacobian(arm, q), 1e-6
     for i in range(arm.n):
         step = np.eye(arm.n)[i] * h

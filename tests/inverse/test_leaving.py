@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import truth
-from oracle import goal
-from test_every_branch import shipped
+from oracle import goal_of_joints
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -26,7 +26,7 @@ NAMES = [
 @pytest.mark.parametrize("name", NAMES)
 def test_the_word_changes_in_one_order_and_never_back(name: str) -> None:
     """3e-8 rad off a straight wrist a Puma was a boundary, and 1e-7 off exact though 0.3 rad missed by 8e-10."""
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     rng = np.random.default_rng(5)
     for family, postures in truth.singular_postures(arm, screw, None, COUNT, seed=2).items():
@@ -35,7 +35,7 @@ def test_the_word_changes_in_one_order_and_never_back(name: str) -> None:
                 rng.uniform(0.3, 1.0, arm.n) * rng.choice([-1.0, 1.0], arm.n) * np.where(arm.prismatic, arm.reach, 1.0)
             )
             q = q0 + OFFSETS[:, None] * way
-            target = goal(task, screw, q).array()
+            target = goal_of_joints(task, screw, q).array()
             s = armkin.ik(arm, target, near=q)
             rank = np.array([RANK.get(Status(int(word)), 3) for word in s.status])
             assert (np.diff(rank) <= 0).all(), f"{family}: {[Status(int(word)).name for word in s.status]}"

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracle import goal, missing
-from test_every_branch import shipped
+from oracle import goal_of_joints, pose_error
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -27,7 +27,7 @@ CASES = [
 @pytest.mark.parametrize(("name", "task", "q", "status"), CASES)
 def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: list[float], status: Status) -> None:
     """No branch was within limits, and the nearest pose within limits 0.0000 mm away."""
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     joints = np.where(arm.prismatic, q, np.radians(q))
     target = armkin.fk(arm, joints)
     if task is not None:
@@ -38,7 +38,7 @@ def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: li
     legal = s.q[s.best]
     assert (legal >= arm.lower - 1e-9).all()
     assert (legal <= arm.upper + 1e-9).all()
-    mm, rad = missing(screw, goal(s.task, screw, joints[None]), legal[None])
+    mm, rad = pose_error(screw, goal_of_joints(s.task, screw, joints[None]), legal[None])
     assert mm[0] < 1e-9 * arm.reach
     assert rad[0] < 1e-8
     second_target = armkin.fk(arm, joints * 0.9)
@@ -49,7 +49,7 @@ def test_a_legal_posture_of_an_edge_is_listed(name: str, task: str | None, q: li
 
 def test_what_else_was_found_stays_beside_a_legal_posture() -> None:
     """Self-motions cross where `near` stands, outside its limits; those of joints 4 and 6 were listed no more."""
-    arm, _ = shipped("wx250s")
+    arm, _ = shipped_arm("wx250s")
     q = np.radians([0.0, 90, 90, 180, 180, 180])
     s = armkin.ik(arm, armkin.fk(arm, q), near=q)
     assert s.best >= 0
@@ -70,7 +70,7 @@ def test_two_roots_in_one_stay_a_boundary_where_a_legal_one_is_found() -> None:
     assert s.status == Status.BOUNDARY
 
 
-def narrowed(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]:
+def narrow_limits(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]:
     """An arm with a wrist whose joints have so many degrees each, around random middles; joint 5 passes zero."""
     arm, rng = armkin.load(robot), np.random.default_rng(4)
     middle = rng.uniform(-1, 1, arm.n)
@@ -83,7 +83,7 @@ def narrowed(robot: str, width: float) -> tuple[armkin.Arm, np.random.Generator]
 @pytest.mark.parametrize("robot", ["irb120", "puma560", "wx250s"])
 def test_what_stands_within_limits_is_not_said_to_be_outside(robot: str, width: float) -> None:
     """A quarter of these were: listed was where joint 4 or joint 6 is as in `near`, and the other one was outside."""
-    arm, rng = narrowed(robot, width)
+    arm, rng = narrow_limits(robot, width)
     q, near = rng.uniform(arm.lower, arm.upper, (2, 120, arm.n))
     q[:, 4] = 0.0
     target = armkin.fk(arm, q)

@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from general_arms import rigid
+from general_arms import random_motions
 
 from armkin.inverse.elimination import line_features
 from armkin.model.rotation import joint_motion
 
 
 def test_rep_is_a_homomorphism() -> None:
-    X, Y = rigid(np.random.default_rng(0), 40).reshape(2, 20, 4, 4)
+    X, Y = random_motions(np.random.default_rng(0), 40).reshape(2, 20, 4, 4)
     product = line_features.rep(X) @ line_features.rep(Y)
     np.testing.assert_allclose(line_features.rep(X @ Y), product, atol=1e-12)
     np.testing.assert_array_equal(line_features.rep(np.eye(4)), np.eye(15))
@@ -17,7 +17,7 @@ def test_rep_is_a_homomorphism() -> None:
 
 def test_rigid_motions_act_linearly_on_features() -> None:
     rng = np.random.default_rng(1)
-    T, p, direction = rigid(rng, 20), rng.standard_normal((20, 3)), rigid(rng, 20)[:, :3, 0]
+    T, p, direction = random_motions(rng, 20), rng.standard_normal((20, 3)), random_motions(rng, 20)[:, :3, 0]
     moved = line_features.features(
         (T[:, :3, :3] @ p[..., None])[..., 0] + T[:, :3, 3], (T[:, :3, :3] @ direction[..., None])[..., 0]
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -13,7 +13,7 @@ from armkin.inverse.singular import linkages
 
 @pytest.mark.parametrize("name", ["puma560", "irb120", "ur5e"])
 def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     rng = np.random.default_rng(5)
     q = rng.uniform(-2.5, 2.5, (16, 6))
     q[:, 4] = 0.0

@@ -7,16 +7,16 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
 
-def beyond(name: str, count: int) -> float:
+def peak_beyond(name: str, count: int) -> float:
     """Peak of a call beyond what it returns [MB]."""
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     q = np.random.default_rng(7).uniform(-3, 3, (count, arm.n))
     goal = targets_of(solver(arm, None)[0], armkin.fk(arm, q), q)
     armkin.ik(arm, goal[:5000])
@@ -31,6 +31,6 @@ def beyond(name: str, count: int) -> float:
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560", "ur5e"])
 def test_memory_beyond_the_results_does_not_grow_with_the_batch(name: str) -> None:
-    small_batch, large_batch = beyond(name, 20_000), beyond(name, 60_000)
+    small_batch, large_batch = peak_beyond(name, 20_000), peak_beyond(name, 60_000)
     assert large_batch < 20, f"{large_batch:.1f} MB"
     assert large_batch - small_batch < 3, f"{small_batch:.1f} MB, {large_batch:.1f} MB with three times as many"

@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checks import Report, examine, random_joints
+from checks import Report, examine_answers, random_joints
 from geometries import random_case
 from oracle import Screws, rotation, shift
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin.inverse.numeric import newton
@@ -20,7 +20,7 @@ from armkin.model.arm import Arm
 OFF = (1e-15, 1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-4, 1e-3)
 
 
-def moved(arm: Arm, size: float, seed: int) -> tuple[Arm, Screws]:
+def move_axes(arm: Arm, size: float, seed: int) -> tuple[Arm, Screws]:
     """Every axis turned and shifted a little, by up to `size` [rad] and a third of `size` [of the reach]."""
     rng = np.random.default_rng(seed)
     link = arm.link.copy()
@@ -35,10 +35,10 @@ def moved(arm: Arm, size: float, seed: int) -> tuple[Arm, Screws]:
     return replace(arm, link=link), Screws(np.array(w), np.array(p), arm.prismatic, P @ link[-1])
 
 
-def check(name: str, size: float, seed: int, count: int) -> Report:
+def check_case(name: str, size: float, seed: int, count: int) -> Report:
     case = random_case(name, seed)
-    arm, screw = moved(case.arm, size, seed)
-    report = examine(arm, screw, case.task, random_joints(screw, count, seed))
+    arm, screw = move_axes(case.arm, size, seed)
+    report = examine_answers(arm, screw, case.task, random_joints(screw, count, seed))
     assert not report.lost.any(), f"{size:.0e}: {report.lost.sum()} lost; {report.weak[report.lost]}"
     assert report.mm < 1e-9 * arm.reach
     assert report.deg < 1e-9
@@ -62,7 +62,7 @@ def test_short_arms(name: str, first: int, sample: Callable[[int, int], int]) ->
     two = OFF[first : first + 2] if len(name) % 2 else OFF[first : first + 2][::-1]
     for size in two[: sample(2, 1)]:
         for seed in range(sample(2, 1)):
-            check(name, size, seed, sample(40, 16))
+            check_case(name, size, seed, sample(40, 16))
 
 
 @pytest.mark.parametrize("size", [1e-13, 1e-11, 1e-8, 1e-5, 1e-3])
@@ -77,7 +77,7 @@ def test_short_arms(name: str, first: int, sample: Callable[[int, int], int]) ->
     ],
 )
 def test_six_joints(name: str, size: float) -> None:
-    report = check(name, size, 1, 30)
+    report = check_case(name, size, 1, 30)
     # nobody claims to have proved what rests on the neighbour of an arm
     s = report.solutions
     assert s.complete.any() == (not s.method.startswith("near"))
@@ -92,9 +92,9 @@ def test_as_many_branches_as_the_ideal_arm(name: str) -> None:
     """Away from singular postures a small change of the arm neither makes nor loses branches."""
     case = random_case(name, 3)
     q = random_joints(case.screw, 60, 2)
-    ideal = examine(case.arm, case.screw, case.task, q)
-    arm, screw = moved(case.arm, 1e-8, 4)
-    report = examine(arm, screw, case.task, q)
+    ideal = examine_answers(case.arm, case.screw, case.task, q)
+    arm, screw = move_axes(case.arm, 1e-8, 4)
+    report = examine_answers(arm, screw, case.task, q)
     strong = (ideal.weak > 1e-2) & (report.weak > 1e-2)
     assert strong.sum() > 20
     same = ideal.counts[strong] == report.counts[strong]
@@ -104,9 +104,9 @@ def test_as_many_branches_as_the_ideal_arm(name: str) -> None:
 def test_names_of_near_arms_are_those_of_the_ideal_one() -> None:
     case = random_case("spherical wrist, elbow", 0)
     q = random_joints(case.screw, 50, 3)
-    ideal = examine(case.arm, case.screw, case.task, q).solutions
-    arm, screw = moved(case.arm, 1e-7, 0)
-    near = examine(arm, screw, case.task, q).solutions
+    ideal = examine_answers(case.arm, case.screw, case.task, q).solutions
+    arm, screw = move_axes(case.arm, 1e-7, 0)
+    near = examine_answers(arm, screw, case.task, q).solutions
     assert not near.method.startswith("spherical")  # the elimination, or the class's own branches corrected
     for k in range(50):
         for b in np.flatnonzero(near.valid[k]):
@@ -119,13 +119,13 @@ def test_names_of_near_arms_are_those_of_the_ideal_one() -> None:
 
 def test_rounded_tables() -> None:
     """pi/2 as 1.5708 and 90 as 89.99998: all eight branches of a Puma."""
-    from geometries import case
+    from geometries import case_of
 
     angle = float(np.degrees(1.5708))
     rows = [(angle, 0, 0), (0, 431.8, 0), (-angle, 20.3, 150.05), (angle, 0, 431.8), (-angle, 0, 0), (0, 0, 56.25)]
     joints = [{"dh": {"alpha": al, "a": a, "d": d, "theta": 0}} for al, a, d in rows]
-    c = case({"convention": "standard", "joints": joints}, "pose")
-    report = examine(c.arm, c.screw, c.task, random_joints(c.screw, 200, 7))
+    c = case_of({"convention": "standard", "joints": joints}, "pose")
+    report = examine_answers(c.arm, c.screw, c.task, random_joints(c.screw, 200, 7))
     assert not report.lost.any()
     assert report.counts.mean() > 7.9
     assert report.mm < 1e-9
@@ -135,25 +135,25 @@ def test_rounded_tables() -> None:
 @pytest.mark.parametrize("name", ["three_dof", "labvolt_5150", "ur5e", "irb120"])
 def test_singular_neighbourhoods(name: str, size: float, sample: Callable[[int, int], int]) -> None:
     """Some poses of thousands lie as close to a singularity as the arm to its class; none is lost."""
-    arm, screw = moved(shipped(name)[0], size, 1)
-    report = examine(arm, screw, None, random_joints(screw, sample(3000, 1000), 1))
+    arm, screw = move_axes(shipped_arm(name)[0], size, 1)
+    report = examine_answers(arm, screw, None, random_joints(screw, sample(3000, 1000), 1))
     assert not report.lost.any(), f"{report.weak[report.lost]}"
 
 
 def test_folds_far_apart() -> None:
     """A sliding pitch arm 1e-3 off: the two branches of a fold lie half a radian apart."""
     case = random_case("pitch arm, 5 joints, slide first", 12)
-    arm, screw = moved(case.arm, 1e-3, 12)
-    report = examine(arm, screw, case.task, random_joints(screw, 1000, 12))
+    arm, screw = move_axes(case.arm, 1e-3, 12)
+    report = examine_answers(arm, screw, case.task, random_joints(screw, 1000, 12))
     assert not report.lost.any()
 
 
 @pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3, 1e-2])
 def test_four_roots_of_three_joints_are_all(size: float, sample: Callable[[int, int], int]) -> None:
     """Seeds and Newton steps in straight-line code: `complete` where four are there, by the quartic's degree."""
-    arm, screw = moved(armkin.load("three_dof"), size, 5)
+    arm, screw = move_axes(armkin.load("three_dof"), size, 5)
     case_joints = random_joints(screw, sample(2000, 500), 5)
-    report = examine(arm, screw, "xyz", case_joints)
+    report = examine_answers(arm, screw, "xyz", case_joints)
     solutions = report.solutions
     assert not report.lost.any()
     assert report.duplicates == 0
@@ -177,7 +177,7 @@ def test_the_pencil_has_all_roots_of_a_near_arm(name: str, size: float) -> None:
 
     Beyond the reach no root is real; where it begins, two of them meet.
     """
-    arm, screw = moved(random_case(name, 1).arm, size, 2)
+    arm, screw = move_axes(random_case(name, 1).arm, size, 2)
     _, geometry = solver(arm, "xyz")
     assert geometry.doubts is not None
     assert geometry.doubts.rows is not None
@@ -198,8 +198,8 @@ def test_the_pencil_has_all_roots_of_a_near_arm(name: str, size: float) -> None:
 @pytest.mark.parametrize("name", ["planar RR", "SCARA, P at 1", "pitch arm, 5 joints", "UR table"])
 def test_no_target_at_all(name: str) -> None:
     case = random_case(name, 1)
-    arm, screw = moved(case.arm, 1e-5, 1)
-    single_report = examine(arm, screw, case.task, random_joints(screw, 1, 1))
+    arm, screw = move_axes(case.arm, 1e-5, 1)
+    single_report = examine_answers(arm, screw, case.task, random_joints(screw, 1, 1))
     s = armkin.ik(arm, single_report.goals.array()[:0], case.task)
     assert (s.q.shape, s.method) == ((0, *s.q.shape[1:]), single_report.solutions.method)
 
@@ -207,11 +207,11 @@ def test_no_target_at_all(name: str) -> None:
 @pytest.mark.parametrize("size", [1e-5, 1e-4, 1e-3])
 def test_both_branches_of_a_stretched_scara(size: float) -> None:
     """Where the elbow is nearly straight, corrections of one seed each leave it open; the pair keeps its names."""
-    arm, screw = moved(armkin.load("cobra600"), size, 5)
+    arm, screw = move_axes(armkin.load("cobra600"), size, 5)
     q = random_joints(screw, 400, 6)
     rng = np.random.default_rng(7)
     q[:, 1] = np.pi * rng.integers(0, 2, 400) + rng.choice([-1, 1], 400) * 10 ** rng.uniform(-2.9, -1, 400)
-    report = examine(arm, screw, "xyz_yaw", q)
+    report = examine_answers(arm, screw, "xyz_yaw", q)
     solutions = report.solutions
     assert not report.lost.any()
     assert report.duplicates == 0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 
@@ -12,7 +12,7 @@ import armkin
 @pytest.mark.parametrize(("name", "count", "part"), [("puma560", 64, 4), ("ur5e", 120, 4), ("jaco_j2n6s300", 32, 8)])
 def test_an_answer_is_that_of_its_target(name: str, count: int, part: int) -> None:
     """Postures of round and of any angles: regular, singular in one way and in several."""
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     rng = np.random.default_rng(3)
     q = rng.uniform(-3, 3, (count, arm.n))
     q = np.where(rng.random(q.shape) < 0.6, rng.integers(-4, 5, q.shape) * np.pi / 4, q)
@@ -31,7 +31,7 @@ def test_an_answer_is_that_of_its_target(name: str, count: int, part: int) -> No
 
 def test_a_self_motion_is_told_alone_as_beside_a_corner() -> None:
     """Where several directions are lost the first step is longer: only there, whatever else is asked about."""
-    arm, _ = shipped("ur5e")
+    arm, _ = shipped_arm("ur5e")
     rng = np.random.default_rng(4)
     q = rng.uniform(-3, 3, (64, 6))
     q[:, 4] = 10.0 ** rng.uniform(-9, -7, 64)  # a wrist that is nearly straight

@@ -18,7 +18,7 @@ from command_line import run
 ARMS = "so101", "labvolt_5150", "moveo", "cobra600"
 
 
-def targets(arm: armkin.Arm, count: int, seed: int) -> np.ndarray:
+def random_targets(arm: armkin.Arm, count: int, seed: int) -> np.ndarray:
     """Positions within reach with a third each of rotations at random, a little off and as the arm has them."""
     rng = np.random.default_rng(seed)
     low, high = np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi)
@@ -53,7 +53,7 @@ def by_brute_force(arm: armkin.Arm, T: np.ndarray, grid: int) -> np.ndarray:
 @pytest.mark.parametrize("name", ARMS)
 def test_no_posture_of_a_grid_is_nearer(name: str, sample: Callable[[int, int], int]) -> None:
     arm = armkin.load(name)
-    T = targets(arm, 24, 4)
+    T = random_targets(arm, 24, 4)
     s = armkin.ik(arm, T, "pose", position_first=True)
     assert s.angle is not None
     best = s.q[:, 0]
@@ -71,7 +71,7 @@ def test_no_posture_of_a_grid_is_nearer(name: str, sample: Callable[[int, int], 
 def test_small_basins_on_limits_are_found() -> None:
     """Two of 250 targets of an SO-101 were answered 4 and 10 degrees worse than a grid does."""
     arm = armkin.load("so101")
-    s = armkin.ik(arm, targets(arm, 250, 7)[[57, 93]], "pose", position_first=True)
+    s = armkin.ik(arm, random_targets(arm, 250, 7)[[57, 93]], "pose", position_first=True)
     assert s.angle is not None
     assert np.rad2deg(s.angle[:, 0]) == pytest.approx([87.788808, 98.651210], abs=1e-5)
 
@@ -79,7 +79,7 @@ def test_small_basins_on_limits_are_found() -> None:
 @pytest.mark.parametrize("name", ARMS)
 def test_rows_are_minima_each_once_by_angle(name: str) -> None:
     arm = armkin.load(name)
-    T = targets(arm, 3, 5)
+    T = random_targets(arm, 3, 5)
     s = armkin.ik(arm, T, "pose", position_first=True)
     assert s.angle is not None
     for k in range(len(T)):

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import truth
-from oracle import goal
-from test_every_branch import shipped
+from oracle import goal_of_joints
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Status
@@ -25,13 +25,13 @@ NAMES = ["three_dof", "planar_3dof", "cobra600", "ra02", "labvolt_5150", "puma56
 
 def nearly_singular(name: str, least: float, most: float) -> tuple[Arm, armkin.Solutions]:
     """Answers for targets 10^least to 10^most rad off singular postures."""
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     rng = np.random.default_rng(3)
     q = np.concatenate(list(truth.singular_postures(arm, screw, None, 12, seed=3).values()))
     steps = 10.0 ** rng.uniform(least, most, (len(q), 1)) * rng.uniform(-1, 1, q.shape)
     q = q + steps * np.where(arm.prismatic, arm.reach, 1.0)
-    return arm, armkin.ik(arm, goal(task, screw, q).array())
+    return arm, armkin.ik(arm, goal_of_joints(task, screw, q).array())
 
 
 @pytest.mark.parametrize(
@@ -65,14 +65,14 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
         return examine(goals, *more)
 
     monkeypatch.setattr(components, "examine", counted)
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     task, _ = solver(arm, None)
-    screw = shipped(name)[1]
+    screw = shipped_arm(name)[1]
     rng = np.random.default_rng(4)
     q = rng.uniform(-np.pi, np.pi, (100, arm.n))
     straight = {"three_dof": 0.0, "puma560": np.arctan2(20.32, 431.8) - np.pi / 2, "ur5e": 0.0}[name]
     q[:, 2] = straight + 10.0 ** rng.uniform(-4.5, -3.6, 100) * rng.choice([-1.0, 1.0], 100)
-    answers = armkin.ik(arm, goal(task, screw, q).array())
+    answers = armkin.ik(arm, goal_of_joints(task, screw, q).array())
     assert len(doubtful_counts) <= 1
     assert sum(doubtful_counts) < 20
     assert set(np.unique(answers.status)) == {Status.EXACT, Status.BOUNDARY}
@@ -80,7 +80,7 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
 
 def test_two_folds_in_one_posture_are_a_boundary() -> None:
     """A stretched elbow under a wrist over the shoulder: eight candidates in three postures, each a multiple root."""
-    arm = shipped("ur5e")[0]
+    arm = shipped_arm("ur5e")[0]
     T = armkin.fk(arm, np.radians([[180.0, 90.0, 0.0, 90.0, 135.0, -135.0], [-90.0, -90.0, 0.0, 90.0, -135.0, -90.0]]))
     s = armkin.ik(arm, T)
     assert (s.status == Status.BOUNDARY).all()
@@ -89,7 +89,7 @@ def test_two_folds_in_one_posture_are_a_boundary() -> None:
 
 def test_a_linkage_that_cannot_move_is_one_posture() -> None:
     """A UR stretched out with a straight wrist: one value of the free joint alone solves its target."""
-    arm = shipped("ur5e")[0]
+    arm = shipped_arm("ur5e")[0]
     q = np.radians([180.0, -135.0, 0.0, -90.0, -180.0, 90.0])
     s = armkin.ik(arm, armkin.fk(arm, q))
     assert s.status == Status.BOUNDARY
@@ -101,12 +101,12 @@ def test_a_linkage_that_cannot_move_is_one_posture() -> None:
 @pytest.mark.parametrize("name", ["three_dof", "ra02", "labvolt_5150"])
 def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two branches end where the elbow is straight: both are on one side, on the other none; nothing is searched."""
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     monkeypatch.setattr(components, "examine", lambda *_: pytest.fail("searched from many starts"))
     for posture in np.random.default_rng(5).uniform(0.3, 0.7, (4, arm.n)):
         posture[2] = 0.0
-        target = goal(task, screw, posture[None]).array()
+        target = goal_of_joints(task, screw, posture[None]).array()
         _, J = newton.scaled(arm, task, posture[None], target)
         U, S, _ = np.linalg.svd(J[0])
         assert S[-1] < 1e-9 < 1e-3 < S[-2]

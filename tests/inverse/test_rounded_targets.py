@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 import right_angles
@@ -19,9 +19,9 @@ from command_line import run
 DIGITS = ("6f", "8f", "12f", "7g", "float32")  # decimals, significant digits
 
 
-def postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
+def typed_postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
     """Within limits, joint 5 straight (of a CRX joint 3 folded), every other one at typed angles."""
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     rng = np.random.default_rng(seed)
     q = rng.uniform(np.clip(arm.lower, -3.0, 3.0), np.clip(arm.upper, -3.0, 3.0), (count, arm.n))
     q[::2] = np.radians(15.0 * np.rint(np.degrees(q[::2]) / 15.0))
@@ -29,7 +29,7 @@ def postures(name: str, count: int, seed: int) -> tuple[armkin.Arm, np.ndarray]:
     return arm, np.clip(q, arm.lower, arm.upper)
 
 
-def rounded(T: np.ndarray, digits: str) -> np.ndarray:
+def round_poses(T: np.ndarray, digits: str) -> np.ndarray:
     if digits == "float32":
         return T.astype(np.float32)
     return np.array([float(f"{x:.{digits}}") for x in T.ravel()]).reshape(T.shape)
@@ -38,10 +38,10 @@ def rounded(T: np.ndarray, digits: str) -> np.ndarray:
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia"])
 def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
     """Up to 37 of 40 moved by more than 10 degrees; some were called unreachable."""
-    arm, q = postures(name, 4, 3)
+    arm, q = typed_postures(name, 4, 3)
     T = armkin.fk(arm, q)
     for number, digits in enumerate(DIGITS):
-        rounded_T = rounded(T, digits)
+        rounded_T = round_poses(T, digits)
         batch = armkin.ik(arm, rounded_T, near=q)
         assert (batch.best >= 0).all(), digits
         best = batch.q[np.arange(len(q)), batch.best]
@@ -54,10 +54,10 @@ def test_its_own_pose_in_few_digits_moves_no_joint(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560"])
 def test_machine_code_stays_as_python_does(name: str) -> None:
-    arm, q = postures(name, 4, 5)
+    arm, q = typed_postures(name, 4, 5)
     T, fast = armkin.fk(arm, q), armkin.compile(armkin.load(name))
     for digits in ("7f", "float32"):
-        compiled, slow = fast.ik(rounded(T, digits), near=q), armkin.ik(arm, rounded(T, digits), near=q)
+        compiled, slow = fast.ik(round_poses(T, digits), near=q), armkin.ik(arm, round_poses(T, digits), near=q)
         best = compiled.q[np.arange(len(q)), compiled.best]
         np.testing.assert_array_equal(best, slow.q[np.arange(len(q)), slow.best])
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6)
@@ -76,7 +76,7 @@ def test_machine_code_stays_as_python_does(name: str) -> None:
 )  # fmt: skip
 def test_it_stands_for_the_self_motion_that_it_is_on_but_for_rounding(q: list[float], rows: int) -> None:
     """It was a row besides the self-motion's: of 426 singular and round postures of a Puma in eight decimals 8."""
-    arm, _ = shipped("puma560")
+    arm, _ = shipped_arm("puma560")
     T = np.round(armkin.fk(arm, q), 8)
     assert armkin.ik(arm, T).valid.sum() == rows
     solutions = armkin.ik(arm, T, near=q)
@@ -86,12 +86,12 @@ def test_it_stands_for_the_self_motion_that_it_is_on_but_for_rounding(q: list[fl
 
 def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
     """The columns of such a rotation stay at right angles, and may keep their length: one of some 40 was moved."""
-    arm, _ = shipped("puma560")
+    arm, _ = shipped_arm("puma560")
     q = np.tile(np.radians([0.0, -90.0, 90.0, 0.0, 0.0, 0.0]), (200, 1))
     q[:, 0] = np.random.default_rng(1).uniform(-2.0, 2.0, len(q))
     T = armkin.fk(arm, q)
     for digits in ("6f", "7f", "7g"):
-        solutions = armkin.ik(arm, rounded(T, digits), near=q)
+        solutions = armkin.ik(arm, round_poses(T, digits), near=q)
         best = solutions.q[np.arange(len(q)), solutions.best]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
 
@@ -99,12 +99,12 @@ def test_a_turn_about_one_axis_shows_its_rounding_by_its_digits() -> None:
 @pytest.mark.parametrize("name", right_angles.POSTURES)
 def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it(name: str) -> None:
     """17 of 24 such postures of a Thor and 13 of a Puma turned a joint by up to 180 degrees."""
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     q = np.radians(right_angles.POSTURES[name])
     T, fast = armkin.fk(arm, q), armkin.compile(arm)
     np.testing.assert_allclose(T[:, :3, :3], np.rint(T[:, :3, :3]), atol=1e-14)
     for digits in ("6g", "7g", "8f", "9g", "float32"):
-        rounded_T = np.asarray(rounded(T, digits), float)
+        rounded_T = np.asarray(round_poses(T, digits), float)
         solutions, coded = armkin.ik(arm, rounded_T, near=q), fast.ik(rounded_T, near=q)
         best = solutions.q[np.arange(len(q)), np.maximum(solutions.best, 0)]
         np.testing.assert_allclose(best, q, rtol=0, atol=1e-6, err_msg=digits)
@@ -116,7 +116,7 @@ def test_a_rotation_by_right_angles_hides_its_rounding_but_the_position_shows_it
 
 def test_a_position_that_is_typed_beside_right_angles_is_exact() -> None:
     """390.25 mm are not rounded, nor is what has twelve digits."""
-    arm, _ = shipped("puma560")
+    arm, _ = shipped_arm("puma560")
     T = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (3, 1, 1))
     T[:, :3, 3] = [390.25, 120.0, 210.5], [390.123456789012, 120.0, 0.0], [390.123, 120.0, 0.0]
     task, _ = solver(arm, None)
@@ -126,7 +126,7 @@ def test_a_position_that_is_typed_beside_right_angles_is_exact() -> None:
 
 def test_where_it_is_the_only_row_the_target_is_a_boundary() -> None:
     """Stretched, and printed a little beyond the reach."""
-    arm, _ = shipped("planar_2dof")
+    arm, _ = shipped_arm("planar_2dof")
     target, near = [500.0004, 0.0], np.zeros(2)
     assert armkin.ik(arm, target, near=near).status == Status.UNREACHABLE
     for targets in (target, [target] * 3):
@@ -139,7 +139,7 @@ def test_where_it_is_the_only_row_the_target_is_a_boundary() -> None:
 
 
 def test_a_near_outside_limits_is_no_answer_however_the_target_is_rounded() -> None:
-    arm, _ = shipped("irb120")
+    arm, _ = shipped_arm("irb120")
     q = np.full(6, 0.3)
     q[4], q[0] = 0.0, arm.upper[0] + 1e-3
     s = armkin.ik(arm, np.round(armkin.fk(arm, q), 6), near=q)
@@ -148,7 +148,7 @@ def test_a_near_outside_limits_is_no_answer_however_the_target_is_rounded() -> N
 
 @pytest.mark.parametrize("wrong", [-1e-9, np.nan, [1e-9, 1e-9]])
 def test_a_rounding_that_is_none_is_refused(wrong: float | list[float]) -> None:
-    arm, _ = shipped("ur5e")
+    arm, _ = shipped_arm("ur5e")
     with pytest.raises(UsageError, match="rounding: expected finite numbers from 0"):
         armkin.ik(arm, armkin.fk(arm, arm.home), rounding=wrong)
 

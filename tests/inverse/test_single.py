@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from oracle import goal
-from test_every_branch import UNLIKE, shipped
+from oracle import goal_of_joints
+from test_every_branch import UNLIKE, shipped_arm
 
 import armkin
 from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number
@@ -24,7 +24,7 @@ CLOSED = [name for name in UNLIKE if name not in GENERAL]
 FIELDS = [f.name for f in fields(armkin.Solutions)]
 
 
-def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
+def ask_single(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutions | None:
     """One target by the short way, and a check that it is as in a batch."""
     single = one_target.short_way(arm, None)
     assert single is not None
@@ -51,7 +51,7 @@ def ask(arm: Arm, target: np.ndarray, near: np.ndarray | None) -> armkin.Solutio
 @pytest.mark.parametrize("name", CLOSED)
 @pytest.mark.parametrize("limits", ["own", "half a turn", "narrow", "wide", "none"])
 def test_one_is_as_in_a_batch(name: str, limits: str, sample: Callable[[int, int], int]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, geometry = solver(arm, None)
     assert geometry.pairs
     turn = np.where(arm.prismatic, 300.0, np.pi)
@@ -65,22 +65,22 @@ def test_one_is_as_in_a_batch(name: str, limits: str, sample: Callable[[int, int
     arm = replace(arm, lower=lower, upper=upper)
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (30, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
-    targets = goal(task, screw, q).array()
+    targets = goal_of_joints(task, screw, q).array()
     short = 0
     for k, target in enumerate(targets[: sample(12, 6)]):
         near = None if k % 3 == 0 else rng.uniform(-1.5, 1.5, arm.n) * turn
-        alone = ask(arm, target, near)
+        alone = ask_single(arm, target, near)
         short += alone is not None and bool(alone.valid.any())
     assert short > 0.75 * sample(12, 6)
     beyond = targets[0].copy()
     beyond[(..., 3) if beyond.ndim == 2 else slice(0, 2)] *= 1.0 if beyond.ndim == 2 else 50.0
     if beyond.ndim == 2:
         beyond[:3, 3] += 3.0 * arm.reach
-    ask(arm, beyond, None)
+    ask_single(arm, beyond, None)
 
 
 def test_what_is_not_plain_is_left_to_the_batch() -> None:
-    arm = shipped("puma560")[0]
+    arm = shipped_arm("puma560")[0]
     T = armkin.fk(arm, np.full(6, 0.3))
     rounded = T.round(8)
     single = one_target.short_way(arm, None)

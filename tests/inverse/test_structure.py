@@ -16,7 +16,7 @@ ROOM = str(Path(armkin.inverse.__file__).parent)
 STRAIGHT = np.radians([20.0, -50.0, 70.0, 30.0, 0.0, 40.0])
 
 
-def entered(arm: armkin.Arm, T: np.ndarray) -> set[tuple[str, str]]:
+def entered_functions(arm: armkin.Arm, T: np.ndarray) -> set[tuple[str, str]]:
     """Files and functions of `inverse` that a second call for a pose enters; no comprehensions."""
     armkin.ik(arm, T)
     functions: set[tuple[str, str]] = set()
@@ -40,13 +40,13 @@ def test_a_singular_pose_enters_few_files_and_functions(name: str, most: tuple[i
     arm = armkin.load(name)
     T = armkin.fk(arm, STRAIGHT)
     assert armkin.ik(arm, T).status == armkin.Status.SINGULAR
-    functions = entered(arm, T)
+    functions = entered_functions(arm, T)
     assert len({file for file, _ in functions}) <= most[0]
     assert len(functions) <= most[1]
 
 
 def test_a_regular_pose_enters_four_files() -> None:
     arm = armkin.load("puma560")
-    functions = entered(arm, armkin.fk(arm, STRAIGHT + 0.3))
+    functions = entered_functions(arm, armkin.fk(arm, STRAIGHT + 0.3))
     assert len({file for file, _ in functions}) <= 4
     assert len(functions) <= 8

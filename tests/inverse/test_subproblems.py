@@ -11,13 +11,13 @@ from armkin.formula.arrays import Array
 from armkin.inverse.closed.subproblems import Pair, quadratic, trig_quadratic
 
 
-def values(e: Array, q: Array) -> Array:
+def form_values(e: Array, q: Array) -> Array:
     """The form at angles q (M, N) for coefficients e (6, N)."""
     c, s = np.cos(q), np.sin(q)
     return np.asarray(e[0] + e[1] * c + e[2] * s + e[3] * c * c + e[4] * c * s + e[5] * s * s)
 
 
-def forms(kind: str, rng: np.random.Generator, count: int) -> Array:
+def random_forms(kind: str, rng: np.random.Generator, count: int) -> Array:
     """Coefficients (6, count): random, of small integers with many zeros, or with prescribed roots."""
     if kind == "integers":
         return rng.integers(-2, 3, (6, count)).astype(float)
@@ -41,9 +41,9 @@ def forms(kind: str, rng: np.random.Generator, count: int) -> Array:
 @pytest.mark.parametrize("kind", ["random", "integers", "sizes", "lines"])
 def test_a_circle_and_a_conic(kind: str) -> None:
     """Every change of sign on a fine grid has its root, every simple root is one, and none is invented."""
-    e = forms(kind, np.random.default_rng(1), 4000)
+    e = random_forms(kind, np.random.default_rng(1), 4000)
     grid = np.linspace(-np.pi, np.pi, 1001)[:, None]
-    vanishing = np.abs(values(e, grid)).max(axis=0) < 1e-9
+    vanishing = np.abs(form_values(e, grid)).max(axis=0) < 1e-9
     nothing = trig_quadratic(list(e[:, vanishing]), 1.0)[1]
     assert nothing.edge.any(axis=(0, 1, 2)).all()
     assert np.all(nothing.free)
@@ -55,16 +55,16 @@ def test_a_circle_and_a_conic(kind: str) -> None:
     doubt = np.asarray(word.edge.reshape(-1, e.shape[1]).any(axis=0))
     on_circle = np.abs(c**2 + s**2 - 1).reshape(4, -1) < 1e-12
     assert not np.any(word.free)
-    root = on_circle & (np.abs(values(e, q)) < 1e-12 * scale)
+    root = on_circle & (np.abs(form_values(e, q)) < 1e-12 * scale)
     assert not (on_circle & ~root & ~doubt).any()
-    residuals = values(e, grid)
+    residuals = form_values(e, grid)
     k, n = np.nonzero(residuals[:-1] * residuals[1:] < 0)
     # bisection: slow and sure
     low, high = grid[k, 0], grid[k + 1, 0]
     below = residuals[k, n]
     for _ in range(60):
         middle = (low + high) / 2
-        left = values(e[:, n], middle) * below <= 0
+        left = form_values(e[:, n], middle) * below <= 0
         low, high = np.where(left, low, middle), np.where(left, middle, high)
     away = np.abs(np.exp(1j * q[:, n]) - np.exp(1j * low))
     assert np.where(root[:, n], away, np.inf).min(axis=0)[~doubt[n]].max() < 1e-9

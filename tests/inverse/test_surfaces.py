@@ -26,7 +26,7 @@ FOLDED = [
 CORNER = [-90, -180, 180, 180, -90, 180]
 
 
-def _rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
+def _held_rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
     arm, posture = armkin.load("iiwa7"), np.deg2rad(q)
     locked_arm = armkin.lock(arm, {"J7": posture[6]})
     return locked_arm, armkin.ik(locked_arm, armkin.fk(arm, posture))
@@ -34,7 +34,7 @@ def _rows(q: list[float]) -> tuple[armkin.Arm, armkin.Solutions]:
 
 @pytest.mark.parametrize(("q", "count"), FOLDED)
 def test_a_folded_elbow_has_a_row_for_each_circuit_of_its_linkage(q: list[float], count: int) -> None:
-    resting_arm, s = _rows(q)
+    resting_arm, s = _held_rows(q)
     rows = s.q[s.valid]
     assert s.status == armkin.Status.SINGULAR
     assert len(rows) == count
@@ -52,7 +52,7 @@ def test_a_folded_elbow_has_a_row_for_each_circuit_of_its_linkage(q: list[float]
     "q", [[180, 0, 90, 0, 45, -180, -129.5], [-90, 180, -90, 0, 180, 90, 0], [0, 0, 0, 0, 0, 90, 9]]
 )
 def test_three_joints_about_one_line_are_one_surface(q: list[float]) -> None:
-    _, s = _rows(q)
+    _, s = _held_rows(q)
     assert s.status == armkin.Status.SINGULAR
     assert s.valid.sum() == 1
     assert s.free.tolist() == [True, False, True, False, True, False]
@@ -67,7 +67,7 @@ def test_an_arm_that_stands_on_a_surface_stays() -> None:
     assert (s.q[0] == posture[:6]).all()
 
 
-def _rounded(target: np.ndarray, seed: int, digit: float) -> np.ndarray:
+def _round_last_digits(target: np.ndarray, seed: int, digit: float) -> np.ndarray:
     """A target with other last digits."""
     target[:3] += np.random.default_rng(seed).uniform(-1, 1, (3, 4)) * [digit, digit, digit, 2e-13]
     return target
@@ -80,7 +80,7 @@ def test_where_surfaces_meet_rounding_does_not_choose_how_many_are_listed(q: lis
     Of the last the posture that was found is 7e-4 rad from where surfaces meet: no joint was said to rest there.
     """
     locked_arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.0})
-    s = armkin.ik(locked_arm, _rounded(armkin.fk(locked_arm, np.deg2rad(q)), seed, 2e-16))
+    s = armkin.ik(locked_arm, _round_last_digits(armkin.fk(locked_arm, np.deg2rad(q)), seed, 2e-16))
     z1, z2, z3, _, _, z6 = np.moveaxis(armkin.jacobian(locked_arm, s.q[s.valid])[:, 3:], 2, 0)
     along = np.stack([(z3 * z1).sum(axis=1), -(z3 * z1).sum(axis=1), (z2 * z6).sum(axis=1), -(z2 * z6).sum(axis=1)])
     assert sorted(along.argmax(axis=0)) == [0, 1, 2, 3]
@@ -108,7 +108,7 @@ def test_a_joint_that_rests_on_a_surface_at_a_double_root_is_not_free() -> None:
     moves = (np.abs(solved).max(axis=0) > 0.1).tolist()
     assert moves == [True, False, False, True, False, True]
     for seed in (56, 59, 143):
-        assert armkin.ik(arm, _rounded(target, seed, 3e-16)).free.tolist() == moves
+        assert armkin.ik(arm, _round_last_digits(target, seed, 3e-16)).free.tolist() == moves
 
 
 @pytest.mark.parametrize("seed", [25, 94, 284])

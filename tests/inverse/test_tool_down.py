@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import truth
 from numpy.typing import NDArray
-from oracle import Screws, screws
-from test_every_branch import shipped
+from oracle import Screws, screws_of
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin import Arm
@@ -33,14 +33,14 @@ joints:
 )
 
 
-def known(name: str) -> tuple[Arm, Screws]:
+def arm_and_screws(name: str) -> tuple[Arm, Screws]:
     if name != "gen3_lite":
-        return shipped(name)
+        return shipped_arm(name)
     file = parse_robot_file(GEN3_LITE)
-    return arm_of_file(file), screws(file)
+    return arm_of_file(file), screws_of(file)
 
 
-def targets(arm: Arm, kind: str, count: int, tilt: float = 0.0) -> Array:
+def special_targets(arm: Arm, kind: str, count: int, tilt: float = 0.0) -> Array:
     """Targets whose axis 6 is parallel to axis 1, meets it, or is reached by turns of right angles."""
     rng = np.random.default_rng([3, count])
     first, last = arm.link[0], arm.link[-1]
@@ -64,8 +64,8 @@ def targets(arm: Arm, kind: str, count: int, tilt: float = 0.0) -> Array:
 @pytest.mark.parametrize("kind", ["parallel", "meeting", "right angles"])
 def test_special_axes_are_complete(name: str, kind: str) -> None:
     """JACO with its tool straight down: no target was complete, and one took 30 ms."""
-    arm, screw = known(name)
-    T = targets(arm, kind, 40)
+    arm, screw = arm_and_screws(name)
+    T = special_targets(arm, kind, 40)
     solutions = armkin.ik(arm, T)
     assert solutions.complete.all()
     solved = np.flatnonzero(solutions.valid.any(axis=1))
@@ -78,9 +78,9 @@ def test_special_axes_are_complete(name: str, kind: str) -> None:
 
 @pytest.mark.parametrize("tilt", [1e-12, 1e-7, 1e-4, 0.02])
 def test_all_but_special_axes_are_complete(tilt: float) -> None:
-    arm, _ = known("jaco_j2n6s300")
+    arm, _ = arm_and_screws("jaco_j2n6s300")
     for kind in ("parallel", "meeting"):
-        exact, beside = (armkin.ik(arm, targets(arm, kind, 40, axis_tilt)) for axis_tilt in (0.0, tilt))
+        exact, beside = (armkin.ik(arm, special_targets(arm, kind, 40, axis_tilt)) for axis_tilt in (0.0, tilt))
         assert beside.complete.all()
         same = exact.valid.sum(axis=1) == beside.valid.sum(axis=1)
         assert same.mean() >= (0.85 if tilt > 1e-3 else 1.0)
@@ -89,10 +89,10 @@ def test_all_but_special_axes_are_complete(tilt: float) -> None:
 @pytest.mark.parametrize("hidden", [0, 1, 2])
 def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
     """Each wide role of a JACO gives back the postures whose tool is down, where the others are singular."""
-    arm, _ = known("jaco_j2n6s300")
+    arm, _ = arm_and_screws("jaco_j2n6s300")
     elimination = method.prepare(arm.link, arm.prismatic)
     closed = elimination.loop
-    T = targets(arm, "parallel", 10)
+    T = special_targets(arm, "parallel", 10)
     goal, known_q = closed.goal(T), armkin.ik(arm, T).q
     worst = {}
     for wide in (False, True):
@@ -109,11 +109,12 @@ def test_a_wide_pencil_has_the_joints_of_its_pose(hidden: int) -> None:
 
 
 def test_only_what_stands_so_is_special() -> None:
-    arm, _ = known("jaco_j2n6s300")
+    arm, _ = arm_and_screws("jaco_j2n6s300")
     elimination = method.prepare(arm.link, arm.prismatic)
     for kind, expected in (("parallel", choose_variable.Kind.PARALLEL), ("meeting", choose_variable.Kind.MEETING)):
         assert (
-            choose_variable.pose_kinds(elimination.loop, elimination.loop.goal(targets(arm, kind, 50))) == expected
+            choose_variable.pose_kinds(elimination.loop, elimination.loop.goal(special_targets(arm, kind, 50)))
+            == expected
         ).all()
     q = np.random.default_rng(1).uniform(-np.pi, np.pi, (500, 6))
     assert (

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from redundant_arms import covers, held_answers, postures
+from redundant_arms import covers_value, held_answers, redundant_postures
 
 import armkin
 from armkin import Status
@@ -18,7 +18,7 @@ def test_families_of_a_nearly_stretched_arm_are_listed() -> None:
     s = armkin.ik(arm, armkin.fk(arm, q))
     assert s.interval is not None
     for k in range(len(q)):
-        assert covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
+        assert covers_value(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
 
 
 def test_where_an_arm_without_a_closed_form_has_no_answer_nothing_is_traced() -> None:
@@ -43,11 +43,11 @@ def test_a_stretched_arm_without_a_closed_form_stands_there(near: np.ndarray | N
 def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:
     """kinova_gen3: a sixth of these places disagreed, as branches were linked wrongly and ended before their turns."""
     arm = armkin.load("kinova_gen3")
-    q, target = postures(arm, None, 5, 21)
+    q, target = redundant_postures(arm, None, 5, 21)
     s = armkin.ik(arm, target)
     assert s.interval is not None
     for k in range(len(q)):
-        assert covers(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
+        assert covers_value(arm, s.interval[k][s.within_limits[k]], q[k, 6]).any()
     assert np.nanmax(s.residual()) <= 1e-9
     again = armkin.ik(arm, target, near=q)
     assert np.take_along_axis(again.motion, again.best[:, None], axis=1).max() <= 1e-6
@@ -55,7 +55,7 @@ def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:
     ends = np.unique(legal.ravel().round(7))
     for value in [*(ends[1::3] - np.deg2rad(1e-5)), *(ends[1::3] + np.deg2rad(1e-5))]:
         own = held_answers(arm, 6, float(value), target[4], None)
-        assert covers(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
+        assert covers_value(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
 
 
 @pytest.mark.parametrize(
@@ -65,26 +65,26 @@ def test_traced_intervals_end_where_their_arm_has_one_posture_less() -> None:
 def test_a_curve_that_passes_a_straight_wrist_is_whole(number: int, value: float, count: int) -> None:
     """kinova_gen3: five targets of 300 that lacked intervals or parts of some, up to half of them."""
     arm = armkin.load("kinova_gen3")
-    target = postures(arm, None, 300, 77)[1][number]
+    target = redundant_postures(arm, None, 300, 77)[1][number]
     s = armkin.ik(arm, target)
     assert s.interval is not None
     value = float(np.deg2rad(value))
     assert len(held_answers(arm, 6, value, target, None)) == count
-    assert covers(arm, s.interval[s.within_limits], value, 0.0).sum() == count
+    assert covers_value(arm, s.interval[s.within_limits], value, 0.0).sum() == count
 
 
 @pytest.mark.parametrize(("number", "count"), [(169, 16), (226, 24), (247, 16)])
 def test_curves_on_which_joint_1_hardly_moves_are_found(number: int, count: int) -> None:
     """kinova_gen3, nearly stretched: all answers lie between two of the values of joint 1 that are asked."""
     arm = armkin.load("kinova_gen3")
-    s = armkin.ik(arm, postures(arm, None, 300, 77)[1][number])
+    s = armkin.ik(arm, redundant_postures(arm, None, 300, 77)[1][number])
     assert s.within_limits.sum() == count
 
 
 def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
     """kinova_gen3 by the elimination at values of joint 7, or by a spherical wrist's branches at values of joint 1."""
     arm = armkin.load("kinova_gen3")
-    target = postures(arm, None, 2, 78)[1]
+    target = redundant_postures(arm, None, 2, 78)[1]
     near = armkin.ik(arm, target)
     assert "near spherical wrist" in near.why
     monkeypatch.setattr(curve_starts, "nearly_closed", lambda arm, free: free)

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 import truth
 from geometries import random_case
-from oracle import goal, newton
-from test_every_branch import UNLIKE, shipped
+from oracle import goal_of_joints, newton
+from test_every_branch import UNLIKE, shipped_arm
 
 import armkin
 from armkin import Status
@@ -27,28 +27,28 @@ from armkin.model.arm import from_links
 
 @pytest.mark.parametrize("name", UNLIKE)
 def test_round_postures(name: str, sample: Callable[[int, int], int]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     kinds = {f"multiples of {step}": truth.round_postures(arm, step, sample(24, 8), seed=1) for step in (90, 45)}
     q = np.concatenate(list(kinds.values()))
     for near in (None, q):
-        verdict, report = truth.judged(arm, screw, kinds, goal(task, screw, q).array(), near)
+        verdict, report = truth.judge_kinds(arm, screw, kinds, goal_of_joints(task, screw, q).array(), near)
         assert verdict, report
 
 
 @pytest.mark.parametrize("name", UNLIKE)
 def test_singular_surfaces(name: str, sample: Callable[[int, int], int]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     postures_of = truth.singular_postures(arm, screw, None, 12, seed=1)
     kinds = {kind: q[: sample(12, 3)] for kind, q in postures_of.items()}
     assert kinds, "no singular surface found"
     q = np.concatenate(list(kinds.values()))
-    target = goal(task, screw, q).array()
+    target = goal_of_joints(task, screw, q).array()
     for near in (None, q):
-        verdict, report = truth.judged(arm, screw, kinds, target, near)
+        verdict, report = truth.judge_kinds(arm, screw, kinds, target, near)
         assert verdict, report
-    verdict, report = truth.judged(arm, screw, kinds, truth.typed(task, target, 9))
+    verdict, report = truth.judge_kinds(arm, screw, kinds, truth.typed_targets(task, target, 9))
     verdict.lost = []  # what solves a target by 1e-9 no more than just is not asked for
     assert verdict, f"9 digits, {report}"
 
@@ -70,43 +70,45 @@ def test_singular_surfaces_of_oblique_wrists(name: str) -> None:
     definition, _ = solver(arm, task)
     kinds = truth.singular_postures(arm, screw, task, 24, seed=1)
     q = np.concatenate(list(kinds.values()))
-    target = goal(definition, screw, q).array()
+    target = goal_of_joints(definition, screw, q).array()
     for near in (None, q):
-        verdict, report = truth.judged(arm, screw, kinds, target, near, task)
+        verdict, report = truth.judge_kinds(arm, screw, kinds, target, near, task)
         assert verdict, report
 
 
 @pytest.mark.parametrize("name", UNLIKE)
 def test_rounded_targets(name: str) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     rng = np.random.default_rng(2)
     q = rng.uniform(-np.pi, np.pi, (24, arm.n))
     q = np.where(arm.prismatic, q * arm.reach / 10, q)
-    target = goal(task, screw, q).array()
-    targets_of = {f"{n} digits": truth.typed(task, target, n) for n in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16)}
+    target = goal_of_joints(task, screw, q).array()
+    targets_of = {f"{n} digits": truth.typed_targets(task, target, n) for n in (3, 4, 5, 6, 7, 7.5, 8, 10, 13, 16)}
     if task.orientation == "full":
-        targets_of |= {f"matrices of {n} digits": truth.printed(target, n) for n in (7, 7.5, 8, 10, 13, 16)}
-    verdict, report = truth.judged(arm, screw, dict.fromkeys(targets_of, q), np.concatenate(list(targets_of.values())))
+        targets_of |= {f"matrices of {n} digits": truth.printed_matrices(target, n) for n in (7, 7.5, 8, 10, 13, 16)}
+    verdict, report = truth.judge_kinds(
+        arm, screw, dict.fromkeys(targets_of, q), np.concatenate(list(targets_of.values()))
+    )
     assert verdict, report
 
 
 @pytest.mark.parametrize("name", ["puma560", "ur5e", "jaco_j2n6s300", "moveo", "kinova_gen3"])
 def test_random_poses_are_complete(name: str) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
     q = np.random.default_rng(9).uniform(-np.pi, np.pi, (500, arm.n))
-    s = armkin.ik(arm, goal(task, screw, q).array())
+    s = armkin.ik(arm, goal_of_joints(task, screw, q).array())
     assert s.complete.mean() >= 0.99
 
 
 @pytest.mark.parametrize("name", ["three_dof", "puma560", "stanford", "jaco_j2n6s300"])
 def test_the_fifth_call_is_the_first_bit_for_bit(name: str) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     q = np.random.default_rng(8).uniform(-1, 1, (40, arm.n))
     q = np.where(arm.prismatic, 300 * q, q)
     task, _ = solver(arm, None)
-    T = goal(task, screw, q).array()
+    T = goal_of_joints(task, screw, q).array()
     first, batch = armkin.ik(arm, T[0]).q.tobytes(), armkin.ik(arm, T).q.tobytes()
     armkin.ik(arm, np.repeat(T, 4, axis=0))  # enough to be recorded
     for _ in range(5):
@@ -115,11 +117,11 @@ def test_the_fifth_call_is_the_first_bit_for_bit(name: str) -> None:
 
 
 def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyPatch) -> None:
-    arm, screw = shipped("ur5e")
+    arm, screw = shipped_arm("ur5e")
     task, _ = solver(arm, None)
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, (20, 6))
     q[10:, 4] = 0.0  # its wrist moves by itself
-    target = goal(task, screw, q).array()
+    target = goal_of_joints(task, screw, q).array()
     right = armkin.ik(arm, target, near=q)
     answers: list[armkin.Solutions] = []
     monkeypatch.setattr(armkin, "ik", lambda *_, **__: answers[-1])
@@ -151,11 +153,11 @@ def test_the_judge_notices_answers_spoilt_on_purpose(monkeypatch: pytest.MonkeyP
 
 
 def test_the_judge_notices_a_self_motion_listed_by_two_of_its_postures(monkeypatch: pytest.MonkeyPatch) -> None:
-    arm, screw = shipped("puma560")
+    arm, screw = shipped_arm("puma560")
     task, _ = solver(arm, None)
     q = np.random.default_rng(3).uniform(-np.pi, np.pi, (8, 6))
     q[:, 4] = 0.0
-    target = goal(task, screw, q).array()
+    target = goal_of_joints(task, screw, q).array()
     right = armkin.ik(arm, target, near=q)
     assert not right.valid[:, -1].any()
     assert truth.judge(arm, screw, None, q, target)
@@ -178,14 +180,14 @@ def test_the_judge_notices_a_self_motion_listed_by_two_of_its_postures(monkeypat
     ],
 )  # fmt: skip
 def test_the_judge_takes_no_posture_for_lost_that_is_on_a_branch_s_component(name: str, q: list[float]) -> None:
-    arm, screw = shipped(name)
+    arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
-    verdict = truth.judge(arm, screw, None, np.array([q]), goal(task, screw, np.array([q])).array())
+    verdict = truth.judge(arm, screw, None, np.array([q]), goal_of_joints(task, screw, np.array([q])).array())
     assert verdict, str(verdict)
 
 
 def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
-    arm = shipped("puma560")[0]
+    arm = shipped_arm("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (300, 6))
     T = armkin.fk(arm, q)
     for rounded_T in (np.asarray(T, np.float32), np.round(T, 7)):
@@ -215,7 +217,7 @@ def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) ->
         return examine(goals, *arguments)  # type: ignore[arg-type]
 
     monkeypatch.setattr(components, "examine", counted)
-    arm = shipped("puma560")[0]
+    arm = shipped_arm("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
     link = arm.link.copy()
     link[:, :3, 3] *= 1000

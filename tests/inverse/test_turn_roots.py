@@ -11,7 +11,7 @@ from armkin.model.arm import Arm, from_links
 DEGREE = 8
 
 
-def values(c: np.ndarray, t: np.ndarray) -> np.ndarray:
+def series_values(c: np.ndarray, t: np.ndarray) -> np.ndarray:
     """Of c[0] + 2 Re(sum of c[k] exp(i k t)), at real or complex t."""
     k = np.arange(1, len(c))[:, None]
     return np.asarray(c[0] + (c[1:, None] * np.exp(1j * k * t) + c[1:, None].conj() * np.exp(-1j * k * t)).sum(axis=0))
@@ -21,7 +21,7 @@ def test_all_roots_are_those_that_an_eigenvalue_problem_has() -> None:
     rng = np.random.default_rng(0)
     c = rng.normal(size=(100, DEGREE + 1)) + 1j * rng.normal(size=(100, DEGREE + 1))
     c[:, 0] = c[:, 0].real
-    listed = roots(np.stack([values(coefficients, sampled_at(DEGREE)) for coefficients in c]), DEGREE)
+    listed = roots(np.stack([series_values(coefficients, sampled_at(DEGREE)) for coefficients in c]), DEGREE)
     assert listed.decided.all()
     for k, coefficients in enumerate(c):
         z = np.roots(np.concatenate([coefficients[:0:-1], coefficients[:1], coefficients[1:].conj()]))

@@ -62,7 +62,7 @@ def test_copies_are_the_legal_ones_nearest_to_near() -> None:
         np.testing.assert_allclose(copy[~has_legal], principal[~has_legal], atol=1e-12)
 
 
-def planar(limits: list[tuple[float, float]]) -> armkin.Arm:
+def planar_arm(limits: list[tuple[float, float]]) -> armkin.Arm:
     """Two planar links of 200 and 300 mm with these limits [deg]."""
     link = np.tile(np.eye(4), (3, 1, 1))
     link[1, 0, 3], link[2, 0, 3] = 200.0, 300.0
@@ -71,7 +71,7 @@ def planar(limits: list[tuple[float, float]]) -> armkin.Arm:
 
 @pytest.mark.parametrize("limits", list(itertools.product(LIMITS[:7], repeat=2)))
 def test_turns_are_all_legal_copies(limits: tuple[tuple[float, float], ...]) -> None:
-    arm = planar(list(limits))
+    arm = planar_arm(list(limits))
     rng = np.random.default_rng(1)
     near = rng.uniform(-6, 6, 2)
     s = armkin.ik(arm, armkin.fk(arm, rng.uniform(-3, 3, (20, 2)))[:, :2, 3], near=near)
@@ -133,7 +133,7 @@ def test_best_is_the_legal_branch_that_moves_least() -> None:
 
 
 def test_of_branches_that_move_the_joints_equally_the_first_is_best() -> None:
-    arm = planar([(-180, 180), (-180, 180)])
+    arm = planar_arm([(-180, 180), (-180, 180)])
     s = armkin.ik(arm, [300.0, 200.0], near=[np.arctan2(2, 3), 0.0])  # elbow up and down, as far on either side
     assert abs(s.motion[0] - s.motion[1]) < 1e-9
     for noise in (-1e-13, 1e-13):

@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from test_every_branch import shipped
+from test_every_branch import shipped_arm
 
 import armkin
 from armkin.errors import UsageError
@@ -25,7 +25,7 @@ def test_results_do_not_depend_on_the_workers(
     name: str, count: int, chunk: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(arrays, "CHUNK", chunk)
-    arm, _ = shipped(name)
+    arm, _ = shipped_arm(name)
     q = np.random.default_rng(11).uniform(-3, 3, (count, arm.n))
     q[::97, :] = np.round(q[::97, :] / (np.pi / 2)) * (np.pi / 2)  # targets on an edge, too
     q[:, arm.prismatic] *= 200  # [mm]
@@ -40,7 +40,7 @@ def test_results_do_not_depend_on_the_workers(
 
 
 def test_a_chunk_gives_what_a_longer_one_gives(monkeypatch: pytest.MonkeyPatch) -> None:
-    arm, _ = shipped("ur5e")
+    arm, _ = shipped_arm("ur5e")
     T = armkin.fk(arm, np.random.default_rng(12).uniform(-3, 3, (5000, arm.n)))
     in_one_chunk = armkin.ik(arm, T)
     monkeypatch.setattr(arrays, "CHUNK", 700)
@@ -55,6 +55,6 @@ def test_every_row_is_given_once_and_in_order(workers: int, least: int, step: in
 
 
 def test_no_worker_is_refused() -> None:
-    arm, _ = shipped("three_dof")
+    arm, _ = shipped_arm("three_dof")
     with pytest.raises(UsageError, match="workers: 0; at least 1 thread is needed"):
         armkin.ik(arm, np.full((5, 3), 200.0), workers=0)

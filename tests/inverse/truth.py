@@ -53,7 +53,9 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
     rng = np.random.default_rng(seed)
     definition, _ = solver(arm, task)
 
-    anything = oracle.goal(definition, screw, np.zeros((1, arm.n)))  # what a Jacobian sees is the task's alone
+    anything = oracle.goal_of_joints(
+        definition, screw, np.zeros((1, arm.n))
+    )  # what a Jacobian sees is the task's alone
 
     def weak(q: Array) -> Array:
         return oracle.weakness(screw, anything, q)
@@ -101,7 +103,7 @@ def singular_postures(arm: Arm, screw: Screws, task: str | None, count: int, see
 # ---- targets -----------------------------------------------------------------------------------------------
 
 
-def rounded(values: Array, digits: float) -> Array:
+def round_numbers(values: Array, digits: float) -> Array:
     """Numbers as printed with that many significant digits; 7.5 of them stand for float32."""
     if digits == 7.5:
         return np.asarray(values, dtype=np.float32).astype(float)
@@ -109,13 +111,13 @@ def rounded(values: Array, digits: float) -> Array:
     return np.array([float(t) for t in text]).reshape(np.shape(values))
 
 
-def typed(task: Any, target: Array, digits: float) -> Array:
+def typed_targets(task: Any, target: Array, digits: float) -> Array:
     """Targets as typed with that many digits: angles in degrees, orientations as roll, pitch, yaw."""
     if task.orientation == "full":
-        angles = rounded(np.degrees(rpy(target[:, :3, :3])), digits)
+        angles = round_numbers(np.degrees(rpy(target[:, :3, :3])), digits)
         typed_poses = np.zeros_like(target)
         typed_poses[:, 3, 3] = 1.0
-        typed_poses[:, :3, 3] = rounded(target[:, :3, 3], digits)
+        typed_poses[:, :3, 3] = round_numbers(target[:, :3, 3], digits)
         for k, (roll, pitch, yaw) in enumerate(angles):
             R = oracle.rotation("z", yaw) @ oracle.rotation("y", pitch) @ oracle.rotation("x", roll)
             typed_poses[k, :3, :3] = R[:3, :3]
@@ -123,10 +125,10 @@ def typed(task: Any, target: Array, digits: float) -> Array:
     unit = np.ones(target.shape[1])
     last = task.position + len(task.sums)
     unit[task.position : last] = 180 / np.pi
-    return rounded(target * unit, digits) / unit
+    return round_numbers(target * unit, digits) / unit
 
 
-def printed(target: Array, digits: float) -> Array:
+def printed_matrices(target: Array, digits: float) -> Array:
     """Matrices (N, 4, 4) whose entries were printed with that many decimals, or went through float32 (7.5)."""
     return np.asarray(target, dtype=np.float32).astype(float) if digits == 7.5 else np.round(target, int(digits))
 
@@ -179,7 +181,7 @@ class Verdict:
 
 def miss_of(arm: Arm, screw: Screws, goals: Goal, q: Array) -> Array:
     """What joint values (M, n) miss, lengths in the arm's reach: (M,)."""
-    mm, rad = oracle.missing(screw, goals, q)
+    mm, rad = oracle.pose_error(screw, goals, q)
     # of a whole orientation that is the norm of nine entries, the angle times the root of two
     return np.hypot(mm / arm.reach, rad / (np.sqrt(2) if goals.orientation == "full" else 1.0))
 
@@ -244,8 +246,8 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     if len(k):
         a, b = s.q[k, i], s.q[k, j]
         close, straight = apart(a, b).max(axis=1) < CLOSE, alike > 0
-        close[close] = _joined(arm, screw, goals.take(k[close]), a[close], b[close])
-        straight[straight] = _straight(arm, screw, goals.take(k[straight]), a[straight], b[straight])
+        close[close] = _middle_solves(arm, screw, goals.take(k[close]), a[close], b[close])
+        straight[straight] = _joined_straight(arm, screw, goals.take(k[straight]), a[straight], b[straight])
         # `near` that misses by what is rounded may be between two manifolds, and stands for one: it must add no row
         added = (stands & (miss > SOLVES))[k, i] | (stands & (miss > SOLVES))[k, j]
         for p in np.flatnonzero(added & (close | straight)):
@@ -261,7 +263,7 @@ def judge(arm: Arm, screw: Screws, task: str | None, q: Array, target: Array, ne
     return verdict
 
 
-def judged(
+def judge_kinds(
     arm: Arm,
     screw: Screws,
     kinds: dict[str, Array],
@@ -277,20 +279,20 @@ def judged(
     return verdict, f"{sorted({str(kind[k]) for k in wrong})}: {verdict}"
 
 
-def _joined(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+def _middle_solves(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     """Whether the posture between two (M, n) solves the target: (M,)."""
-    return np.asarray(miss_of(arm, screw, goals, a + 0.5 * _way(screw, a, b)) < 0.9 * SOLVES)
+    return np.asarray(miss_of(arm, screw, goals, a + 0.5 * _joint_difference(screw, a, b)) < 0.9 * SOLVES)
 
 
-def _way(screw: Screws, a: Array, b: Array) -> Array:
+def _joint_difference(screw: Screws, a: Array, b: Array) -> Array:
     d = b - a
     return np.where(screw.prismatic, d, d - 2 * np.pi * np.rint(d / (2 * np.pi)))
 
 
-def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
+def _joined_straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
     """Whether the joints move from one to the other (M, n) at constant paces and keep the target, either way round."""
     unit = np.where(screw.prismatic, screw.size, 1.0)
-    d = _way(screw, a, b) / unit
+    d = _joint_difference(screw, a, b) / unit
     half = ~screw.prismatic & (np.pi - np.abs(d) < 1e-3)
     joined = np.zeros(len(a), bool)
     for flip in itertools.product((False, True), repeat=a.shape[1]):
@@ -303,7 +305,7 @@ def _straight(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) -> Bool:
             along = goals.take(np.repeat(k, len(parts)))
             solves = miss_of(arm, screw, along, q) < 0.01  # of more the next 1e-4 rad or sizes make no solution
             r = np.flatnonzero(solves)
-            corrected = across(screw, along.take(r), q[r])
+            corrected = settle_across(screw, along.take(r), q[r])
             solves[r] = np.abs((corrected - q[r]) / unit).max(axis=1) <= 1e-4  # as far as roots of high order are off
             solves[r] &= miss_of(arm, screw, along.take(r), corrected) < 0.9 * SOLVES
             k = k[solves.reshape(len(k), len(parts)).all(axis=1)]
@@ -317,17 +319,17 @@ def _in_one_component(arm: Arm, screw: Screws, goals: Goal, a: Array, b: Array) 
     Beside it means within a tenth of its length: that reaches neither of the two, so that what is found is a third
     solution. Isolated branches have none.
     """
-    d, stays = _way(screw, a, b), np.ones(len(a), bool)
+    d, stays = _joint_difference(screw, a, b), np.ones(len(a), bool)
     for part in (0.25, 0.5, 0.75):
         q = a + part * d
-        corrected = across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
+        corrected = settle_across(screw, goals, q, weak=1e-4)  # of a component with two roots 1e-4 at most is lost
         beside = np.abs(corrected - q).max(axis=1) <= 0.1 * np.abs(d).max(axis=1)
         beside &= miss_of(arm, screw, goals, corrected) < 1.1 * SOLVES  # what is surely more parts them, and no less
         stays &= beside | (miss_of(arm, screw, goals, q) < 1.1 * SOLVES)
     return stays
 
 
-def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
+def settle_across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
     """Postures (M, n) after two Newton steps that go nowhere along a component's own direction.
 
     That is the last one, if its singular value is below `weak`; others are lost below 1e-6.
@@ -342,7 +344,7 @@ def across(screw: Screws, goals: Goal, q: Array, weak: float = 1e-6) -> Array:
     return q
 
 
-def movable(screw: Screws, goals: Goal, q: Array, joint: int, way: float = 0.1) -> Bool:
+def can_move(screw: Screws, goals: Goal, q: Array, joint: int, way: float = 0.1) -> Bool:
     """Whether postures (M, n) of the same targets exist with this joint moved by `way`, the others by up to a radian.
 
     The joint is held there, the others go by Newton steps of least norm: (M,).
@@ -361,14 +363,14 @@ def movable(screw: Screws, goals: Goal, q: Array, joint: int, way: float = 0.1) 
     return np.asarray((size < 1e-10) & (np.abs((shifted - q) / unit).max(axis=1) < 1.0))
 
 
-def idle(screw: Screws, solutions: Any, target: Array) -> list[tuple[int, int]]:
+def idle_free_joints(screw: Screws, solutions: Any, target: Array) -> list[tuple[int, int]]:
     """Rows and joints that are called free, but of which no branch's self-motion moves the joint, either way."""
     goals, idle_joints = goal_of(solutions.task, target), []
     for row in np.flatnonzero(solutions.free.any(axis=1)):
         q = solutions.q[row][solutions.valid[row]]
         row_goals = goals.take(np.full(len(q), row))
         for joint in np.flatnonzero(solutions.free[row]).tolist():
-            if not any(movable(screw, row_goals, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
+            if not any(can_move(screw, row_goals, q, joint, way).any() for way in (0.1, -0.1, 0.02, -0.02)):
                 idle_joints.append((int(row), int(joint)))
     return idle_joints
 

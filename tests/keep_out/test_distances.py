@@ -18,7 +18,7 @@ MANY = 4000
 _GOLDEN = (np.sqrt(5.0) - 1.0) / 2.0
 
 
-def _least(f: Callable[[Array], Array], count: int) -> Array:
+def _least_value(f: Callable[[Array], Array], count: int) -> Array:
     """Least value over [0, 1] of convex functions f (count,) -> (count,), by golden sections."""
     low, high = np.zeros(count), np.ones(count)
     best = np.minimum(f(low), f(high))
@@ -30,7 +30,7 @@ def _least(f: Callable[[Array], Array], count: int) -> Array:
     return best
 
 
-def _segments(rng: np.random.Generator, count: int, size: float) -> tuple[Array, Array]:
+def _random_segments(rng: np.random.Generator, count: int, size: float) -> tuple[Array, Array]:
     """Ends (3, count): a quarter along axes, a quarter points, the rest anyhow."""
     a, b = rng.uniform(-size, size, (2, 3, count))
     axis = rng.integers(0, 3, count)
@@ -49,11 +49,11 @@ def _point_to_segment(p: Array, c: Array, d: Array) -> Array:
 
 def test_segments_are_as_far_apart_as_the_search_finds() -> None:
     rng = np.random.default_rng(1)
-    (a, b), (c, d) = (_segments(rng, MANY, 300.0) for _ in range(2))
+    (a, b), (c, d) = (_random_segments(rng, MANY, 300.0) for _ in range(2))
     third = np.arange(MANY) % 3 == 0  # parallel, and nearly so
     d = np.where(third, c + (b - a) * rng.uniform(-2, 2, MANY) + rng.choice([0.0, 1e-9, 1e-5], MANY), d)
     distances = segment_distance(a, b, c, d)
-    assert np.abs(distances - _least(lambda s: _point_to_segment(a + s * (b - a), c, d), MANY)).max() < 1e-9
+    assert np.abs(distances - _least_value(lambda s: _point_to_segment(a + s * (b - a), c, d), MANY)).max() < 1e-9
 
 
 def test_crossing_segments_touch() -> None:
@@ -61,7 +61,7 @@ def test_crossing_segments_touch() -> None:
     assert segment_distance(a, b, c, d).item() == 0.0
 
 
-def _signed(box: Box, p: Array) -> Array:
+def _signed_distance(box: Box, p: Array) -> Array:
     """Signed distance of points (3, M) to a box, point by point."""
     local = np.abs(box.axes.T @ (p - box.centre[:, None])) - box.half[:, None]
     beyond = np.linalg.norm(np.maximum(local, 0.0), axis=0)
@@ -73,8 +73,8 @@ def test_segments_are_as_far_from_a_box_as_the_search_finds(turned: bool) -> Non
     rng = np.random.default_rng(2)
     T = transform((30.0, -20.0, 10.0), (20.0, 30.0, 40.0) if turned else (0.0, 0.0, 0.0))
     box = Box(T[:3, 3], T[:3, :3], np.array([60.0, 100.0, 30.0]))
-    a, b = _segments(rng, MANY, 250.0)
-    expected = _least(lambda t: _signed(box, a + t * (b - a)), MANY)
+    a, b = _random_segments(rng, MANY, 250.0)
+    expected = _least_value(lambda t: _signed_distance(box, a + t * (b - a)), MANY)
     distances = box.distance(a, b)
     assert np.abs(distances - expected).max() < 1e-9
     assert (np.sign(distances) == np.sign(np.where(np.abs(expected) < 1e-12, 0.0, expected))).mean() > 0.999

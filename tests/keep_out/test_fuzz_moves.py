@@ -36,7 +36,7 @@ from armkin.board_catalogue import BOARDS
 from armkin.keep_out.body_pairs import Guard, guard
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import ROOT, Result, run
-from starting_elsewhere import KINDS, watch
+from starting_elsewhere import KINDS, watch_counts
 
 SCENE = """
 clearance: 2
@@ -59,7 +59,7 @@ STOPPED = 128  # and the signal, of which there is none here
 BUSES = ("feetech", "dynamixel")
 
 
-def _robot(kind: str) -> str:
+def _robot_text(kind: str) -> str:
     """three_dof on a kind of board: with switches, or a gripper, where that kind has them."""
     document = yaml.safe_load(KINDS["feetech" if kind == "dynamixel" else kind])
     document["board"] = {**document["board"], "kind": kind}
@@ -79,7 +79,7 @@ def _robot(kind: str) -> str:
     return str(yaml.safe_dump(document, sort_keys=False))
 
 
-def _pressed(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
+def _switch_levels(arm: armkin.Arm) -> Callable[[int, Sequence[int]], bool]:
     """Levels of the switches of the arm on X, Y and Z: as `homing.switch_levels`, for one motor a joint, and quick."""
     turns = [(float(arm.home[k]), 1 / float(arm.motor_gain[k, k]), np.deg2rad(SWITCHES[k])) for k in range(3)]
 
@@ -106,12 +106,14 @@ class Arms:
         self.arms = dict[str, armkin.Arm]()
         for number, kind in enumerate((OURS, "grbl", "klipper", *BUSES), 20):
             file = folder / f"{kind}.yaml"
-            file.write_text(_robot(kind))
+            file.write_text(_robot_text(kind))
             arm = armkin.load(file, scene=self.scene)
-            port: Any = SimPort(SimBoard(BOARDS[OURS], _pressed(arm))) if kind == OURS else board_of(arm).simulated()
+            port: Any = (
+                SimPort(SimBoard(BOARDS[OURS], _switch_levels(arm))) if kind == OURS else board_of(arm).simulated()
+            )
             port.simulated, port.name, port.step = False, f"COM{number}", 0.005
             self.seen[kind] = []
-            watch(arm, kind, port, self.seen[kind])
+            watch_counts(arm, kind, port, self.seen[kind])
             self.files[kind], self.ports[kind], self.arms[kind] = file, port, arm
         self.held: Guard = guard(arm)
 
@@ -165,7 +167,7 @@ class Arms:
 
 
 @contextmanager
-def arms() -> Iterator[Arms]:
+def fuzzed_arms() -> Iterator[Arms]:
     """The arms, with the plug-in found as if it was installed."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -193,41 +195,41 @@ def arms() -> Iterator[Arms]:
         yield fuzzed
 
 
-def _joints(rng: np.random.Generator) -> list[str]:
+def _random_joints(rng: np.random.Generator) -> list[str]:
     return [f"{x:.3f}" for x in rng.uniform((-120, -20, -120), (120, 120, 120))]
 
 
-def _tip(rng: np.random.Generator) -> list[str]:
+def _random_tip(rng: np.random.Generator) -> list[str]:
     r, turn = rng.uniform(150, 450), rng.uniform(-2, 2)
     return [f"{x:.2f}" for x in (r * np.cos(turn), r * np.sin(turn), rng.uniform(-50, 500))]
 
 
-def _motion(rng: np.random.Generator, folder: Path) -> tuple[str, list[list[str]], bytes]:
+def _random_motion(rng: np.random.Generator, folder: Path) -> tuple[str, list[list[str]], bytes]:
     """A command, its words in groups that may stand in any order, and what it is given on stdin."""
     kind = rng.integers(7)
     speed = [["--speed", f"{rng.uniform(20, 100):.0f}"]] if rng.random() < 0.5 else []
-    rows = "\n".join(",".join(_joints(rng)) for _ in range(3))
+    rows = "\n".join(",".join(_random_joints(rng)) for _ in range(3))
     if kind == 0:
-        return "send", [["--target", ",".join(_tip(rng))], *speed], b""
+        return "send", [["--target", ",".join(_random_tip(rng))], *speed], b""
     if kind == 1:
         return "send", [["--batch", "-"]], rows.encode()
     if kind == 2:
         (folder / "rows.csv").write_text(rows)
         return "send", [["--batch", str(folder / "rows.csv")], ["--blend", "5"], *speed], b""
     if kind == 3:
-        vias = [["--via", ",".join(_tip(rng))] for _ in range(3)]
+        vias = [["--via", ",".join(_random_tip(rng))] for _ in range(3)]
         return "path", [[word for via in vias for word in via], ["--blend", "10"]], b""
     if kind == 4:
-        moves = "\n".join(f"  - joint: [{', '.join(_joints(rng))}]" for _ in range(3))
+        moves = "\n".join(f"  - joint: [{', '.join(_random_joints(rng))}]" for _ in range(3))
         (folder / "path.yaml").write_text(f"moves:\n{moves}\n")
         return "send", [["--path", str(folder / "path.yaml")], *speed], b""
     if kind == 5:
         joint, rate = rng.integers(1, 4), rng.uniform(10, 60) * rng.choice([-1, 1])
         return "jog", [[f"q{joint}", f"{rate:.1f}"], ["--seconds", f"{rng.uniform(0.2, 4):.1f}"]], b""
-    return "send", [_joints(rng), *speed], b""
+    return "send", [_random_joints(rng), *speed], b""
 
 
-def _words(rng: np.random.Generator, robot: Path, groups: list[list[str]]) -> list[str]:
+def _shuffled_words(rng: np.random.Generator, robot: Path, groups: list[list[str]]) -> list[str]:
     """Options in any order, the robot and what belongs behind it among them."""
     options = groups + ([["--json"]] if rng.random() < 0.5 else [])
     first = [] if options[0][0].startswith("--") else options.pop(0)
@@ -236,19 +238,19 @@ def _words(rng: np.random.Generator, robot: Path, groups: list[list[str]]) -> li
     return [word for group in (*options[:place], [str(robot), *first], *options[place:]) for word in group]
 
 
-def fuzz(count: int, seed: int) -> Counter[str]:
+def fuzz_commands(count: int, seed: int) -> Counter[str]:
     """Carry out commands; how many of what came of them. AssertionError for a hit."""
     rng, tally = np.random.default_rng(seed), Counter[str]()
-    with arms() as fuzzed:
+    with fuzzed_arms() as fuzzed:
         scene = ["--scene", str(fuzzed.scene)]
         fuzzed.begin()
         for number in range(count):
             kind = list(fuzzed.files)[number % len(fuzzed.files)]
-            _one(fuzzed, kind, rng, scene, tally)
+            _fuzz_command(fuzzed, kind, rng, scene, tally)
     return tally
 
 
-def _one(fuzzed: Arms, kind: str, rng: np.random.Generator, scene: list[str], tally: Counter[str]) -> None:
+def _fuzz_command(fuzzed: Arms, kind: str, rng: np.random.Generator, scene: list[str], tally: Counter[str]) -> None:
     """A command on a kind's arm, and what belongs to it."""
     robot, dice = fuzzed.files[kind], rng.random()
     if dice < 0.12 and kind == OURS:
@@ -264,14 +266,14 @@ def _one(fuzzed: Arms, kind: str, rng: np.random.Generator, scene: list[str], ta
         assert fuzzed.made < np.deg2rad(0.2)
         tally[f"{name} {kind}"] += 1
         return
-    name, groups, stdin = _motion(rng, fuzzed.scene.parent)
+    name, groups, stdin = _random_motion(rng, fuzzed.scene.parent)
     if rng.random() < 0.08:  # without the scene that the port remembers
-        completed = fuzzed.ask(kind, name, *_words(rng, robot, groups), stdin=stdin)
+        completed = fuzzed.ask(kind, name, *_shuffled_words(rng, robot, groups), stdin=stdin)
         assert (completed.code, "was last used with the scene" in completed.err) == (2, True), completed.err
         assert not fuzzed.given or not fuzzed.seen[kind] or fuzzed.made < np.deg2rad(0.2)
         tally["without scene"] += 1
         return
-    words = _words(rng, robot, [*groups, scene])
+    words = _shuffled_words(rng, robot, [*groups, scene])
     until = rng.uniform(0.1, 3.0) if rng.random() < 0.3 and name != "jog" else np.inf
     completed = fuzzed.ask(kind, name, *words, stdin=stdin, until=until)
     assert completed.code != 2, completed.err
@@ -283,7 +285,7 @@ def _one(fuzzed: Arms, kind: str, rng: np.random.Generator, scene: list[str], ta
 
 
 def test_no_command_takes_an_arm_through_a_keep_out() -> None:
-    tally = fuzz(15, 2)
+    tally = fuzz_commands(15, 2)
     for kind in (OURS, "grbl", "klipper", *BUSES):
         assert sum(tally[f"{code} {kind}"] for code in (0, 3, STOPPED)), tally
     assert sum(tally[key] for key in tally if key.startswith("3 ")) > 1, tally
@@ -291,7 +293,7 @@ def test_no_command_takes_an_arm_through_a_keep_out() -> None:
 
 
 def test_grip_home_and_a_motion_that_is_gone_on_with() -> None:
-    with arms() as fuzzed:
+    with fuzzed_arms() as fuzzed:
         robot, scene = fuzzed.files[OURS], ["--scene", fuzzed.scene]
         fuzzed.begin()
         assert fuzzed.ask(OURS, "grip", robot, "closed", "--assume", "open").code == 0
@@ -304,7 +306,7 @@ def test_grip_home_and_a_motion_that_is_gone_on_with() -> None:
 
 
 def test_after_the_search_for_switches_the_move_is_proved() -> None:
-    with arms() as fuzzed:
+    with fuzzed_arms() as fuzzed:
         robot, port = fuzzed.files[OURS], fuzzed.ports[OURS].name
         fuzzed.begin()
         post = fuzzed.scene.with_name("post.yaml")
@@ -320,4 +322,4 @@ def test_after_the_search_for_switches_the_move_is_proved() -> None:
 
 
 if __name__ == "__main__":
-    print("no hit:", dict(fuzz(int(sys.argv[1]), int(sys.argv[2]))))
+    print("no hit:", dict(fuzz_commands(int(sys.argv[1]), int(sys.argv[2]))))

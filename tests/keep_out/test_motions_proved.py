@@ -41,7 +41,7 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def _arm(kind: str, table: Path) -> Arm:
+def _arm_beside_table(kind: str, table: Path) -> Arm:
     if kind == "rail":
         path = table.parent / "rail.yaml"
         path.write_text(RAIL)
@@ -50,7 +50,7 @@ def _arm(kind: str, table: Path) -> Arm:
     return replace(arm, max_speed=np.ones(arm.n), max_accel=np.ones(arm.n))
 
 
-def _postures(arm: Arm, count: int, seed: int) -> Array:
+def _random_postures(arm: Arm, count: int, seed: int) -> Array:
     rng = np.random.default_rng(seed)
     low, high = np.maximum(arm.lower, -300.0), np.minimum(arm.upper, 300.0)
     low, high = (np.where(arm.prismatic, x, np.clip(x, -3.0, 3.0)) for x in (low, high))
@@ -60,8 +60,8 @@ def _postures(arm: Arm, count: int, seed: int) -> Array:
 
 @pytest.mark.parametrize("kind", ["three_dof", "ur5e", "rail"])
 def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: Path) -> None:
-    arm = _arm(kind, table)
-    held, q = guard(arm), _postures(arm, 400, 5)
+    arm = _arm_beside_table(kind, table)
+    held, q = guard(arm), _random_postures(arm, 400, 5)
     share, free = np.linspace(0.0, 1.0, 1500)[:, None], 0
     for a, b in zip(q[:60], q[-60:], strict=True):
         proof = prove_trajectory(plan_joint_moves(arm, a, b))
@@ -77,10 +77,10 @@ def test_random_motions_are_free_when_proved_and_hit_when_not(kind: str, table: 
 def test_a_body_moves_no_farther_than_its_levers(ratio: float, table: Path) -> None:
     """Of a calibrated arm, too, whose joints move by more than they are told."""
     for kind in ("ur5e", "rail"):
-        arm = _arm(kind, table)
+        arm = _arm_beside_table(kind, table)
         arm = replace(arm, ratio=np.full(arm.n, ratio))
         held, rng = guard(arm), np.random.default_rng(7)
-        q = _postures(arm, 2000, 6)
+        q = _random_postures(arm, 2000, 6)
         step = rng.normal(size=q.shape) * np.where(arm.prismatic, 1.0, 0.01)
         moved = np.abs(held.distances(q + step) - held.distances(q))
         bound = np.abs(step) @ levers(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
@@ -156,7 +156,7 @@ def test_an_arm_in_a_hit_may_leave_it_and_not_go_deeper(table: Path) -> None:
 
 def test_hits_of_a_chain_are_those_of_each_sample(table: Path) -> None:
     arm = armkin.load("ur5e", scene=table)
-    held, q = guard(arm), _postures(arm, 60, 9)
+    held, q = guard(arm), _random_postures(arm, 60, 9)
     chain = np.concatenate([np.linspace(a, b, 97)[:-1] for a, b in pairwise(q[:9])])
     assert hit_samples(held, chain).tolist() == (held.clearances(chain) < 0).any(axis=1).tolist()
 

@@ -17,7 +17,7 @@ from armkin.model.arm import Arm, from_links
 ROBOTS = Path(__file__).parents[2] / "robots"
 
 
-def taskless(name: str) -> Arm:
+def taskless_arm(name: str) -> Arm:
     """A shipped robot as if its file named no task."""
     return replace(armkin.load(ROBOTS / f"{name}.yaml"), task=None)
 
@@ -38,7 +38,7 @@ def taskless(name: str) -> Arm:
 def test_the_task_follows_from_the_joints_that_are_left(
     name: str, held: dict[str, float], task: str, method: str
 ) -> None:
-    arm = armkin.lock(taskless(name), held)
+    arm = armkin.lock(taskless_arm(name), held)
     definition, geometry = solver(arm, None)
     assert (definition.name, geometry.name) == (task, method)
     q = np.random.default_rng(0).uniform(-2, 2, (50, arm.n))
@@ -56,14 +56,14 @@ def test_the_task_of_the_file_stays() -> None:
 
 def test_seven_joints_have_a_pose_and_one_too_many() -> None:
     for name in ("panda", "iiwa7"):
-        arm = taskless(name)
+        arm = taskless_arm(name)
         assert armkin.ik(arm, armkin.fk(arm, arm.home)).interval is not None
         with pytest.raises(UsageError, match="7 joints for the 3 constraints of task xyz leave 4 degrees of freedom"):
             armkin.ik(arm, [400, 0, 400], "xyz")
 
 
 def test_an_arm_without_a_task_says_what_to_ask_for() -> None:
-    arm = armkin.lock(taskless("ur5e"), {"J1": 0.0, "J5": 1.57, "J6": 0.0})  # three parallel axes, not along z
+    arm = armkin.lock(taskless_arm("ur5e"), {"J1": 0.0, "J5": 1.57, "J6": 0.0})  # three parallel axes, not along z
     with pytest.raises(UsageError, match=r"no task fits .* 3 joints \(RRR\) by itself: ask for task pose"):
         armkin.ik(arm, [0, 0, 0])
     q = np.array([0.3, 0.4, 0.5])

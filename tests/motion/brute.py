@@ -39,7 +39,7 @@ def legal_copies(arm: Arm, q: np.ndarray) -> list[np.ndarray]:
     return [np.array(row) for row in itertools.product(*choices)]
 
 
-def nodes(arm: Arm, targets: np.ndarray) -> Nodes:
+def legal_nodes(arm: Arm, targets: np.ndarray) -> Nodes:
     """All legal joint values at all targets."""
     solutions = armkin.ik(arm, targets)
     columns = []
@@ -49,7 +49,7 @@ def nodes(arm: Arm, targets: np.ndarray) -> Nodes:
     return Nodes(columns)
 
 
-def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarray:
+def accepted_edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarray:
     """Which nodes (k, n) go on to which (m, n): (k, m) bool."""
     D = b[None] - a[:, None]
     free = ~arm.prismatic & ~np.isfinite(arm.lower) & ~np.isfinite(arm.upper)
@@ -68,12 +68,12 @@ def edges(arm: Arm, a: np.ndarray, b: np.ndarray, tolerance: float) -> np.ndarra
     return near
 
 
-def carried(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray | None = None) -> list[np.ndarray]:
+def carried_nodes(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray | None = None) -> list[np.ndarray]:
     """Joint values (k, n) that some run from the first sample arrives at, at every sample up to the last it reaches.
 
     start: (k, n) those at the first sample that count; by default all.
     """
-    n = nodes(arm, targets)
+    n = legal_nodes(arm, targets)
     first = n.q[0]
     if start is not None and len(first):
         away = np.abs(first[:, None] - start[None])
@@ -84,14 +84,14 @@ def carried(arm: Arm, targets: np.ndarray, tolerance: float, start: np.ndarray |
     for i in range(len(targets) - 1):
         if not len(columns[-1]) or not len(n.q[i + 1]):
             break
-        columns.append(n.q[i + 1][edges(arm, columns[-1], n.q[i + 1], tolerance).any(axis=0)])
+        columns.append(n.q[i + 1][accepted_edges(arm, columns[-1], n.q[i + 1], tolerance).any(axis=0)])
     return columns if len(columns[-1]) else columns[:-1]
 
 
-def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
+def fewest_runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int]]:
     """The fewest runs that carry all that can be carried, as first and last samples: each goes as far as any can."""
-    n = nodes(arm, targets)
-    goes = [edges(arm, n.q[i], n.q[i + 1], tolerance) for i in range(len(targets) - 1)]
+    n = legal_nodes(arm, targets)
+    goes = [accepted_edges(arm, n.q[i], n.q[i + 1], tolerance) for i in range(len(targets) - 1)]
     spans = []
     i = 0
     while i < len(goes):
@@ -106,11 +106,11 @@ def runs(arm: Arm, targets: np.ndarray, tolerance: float) -> list[tuple[int, int
     return spans
 
 
-def zoomed(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray, tolerance: float) -> float:
+def reach_length(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray, tolerance: float) -> float:
     """The length that some run from the first sample arrives at, to a two-hundredth of a millimetre; -1: no start."""
     start, end = None, s[-1]
     while True:
-        alive = carried(arm, targets(s), tolerance, start=start)
+        alive = carried_nodes(arm, targets(s), tolerance, start=start)
         if not alive or s[len(alive) - 1] == end or (len(alive) < len(s) and s[1] - s[0] < 0.005):
             return float(s[len(alive) - 1]) if alive else -1.0
         k = max(len(alive) - 3, 0)
@@ -119,6 +119,6 @@ def zoomed(arm: Arm, targets: Callable[[np.ndarray], np.ndarray], s: np.ndarray,
         start, s = alive[k], np.linspace(s[k], min(far, end), 41)
 
 
-def reach(arm: Arm, targets: np.ndarray, tolerance: float) -> int:
+def last_sample(arm: Arm, targets: np.ndarray, tolerance: float) -> int:
     """The last sample that any run from the first sample arrives at; -1: no legal start."""
-    return len(carried(arm, targets, tolerance)) - 1
+    return len(carried_nodes(arm, targets, tolerance)) - 1

@@ -10,7 +10,7 @@ from armkin.motion.plan.path_plan import PathPlan
 CENTRE = np.array([340.0, 80.0, 300.0])
 
 
-def harmonics(seed: int, count: int) -> np.ndarray:
+def harmonic_curve(seed: int, count: int) -> np.ndarray:
     """A random closed curve of five harmonics within 60 mm of its middle: (count, 2) [mm]."""
     c = np.random.default_rng(seed).normal(size=(4, 5)) * 40 / np.arange(1, 6) ** 1.6
     a = np.arange(1, 6)[:, None] * np.linspace(0, 2 * np.pi, count)
@@ -23,7 +23,7 @@ def on_path(plan: PathPlan) -> float:
     return sum(stretch.duration for stretch, _ in plan.on_path.values())
 
 
-def tips(plan: PathPlan) -> np.ndarray:
+def executed_tips(plan: PathPlan) -> np.ndarray:
     """The executed tip, densely, while it is on the path."""
     parts = []
     for number, (stretch, _) in sorted(plan.on_path.items()):

@@ -20,7 +20,7 @@ def three_dof() -> Arm:
     return armkin.load("robots/three_dof.yaml")
 
 
-def wander(arm: Arm, count: int, step: float) -> np.ndarray:
+def random_waypoints(arm: Arm, count: int, step: float) -> np.ndarray:
     """Waypoints at random, each joint up to `step` degrees from the one before, within limits."""
     rng = np.random.default_rng(5)
     rows = [arm.home]
@@ -33,7 +33,7 @@ def wander(arm: Arm, count: int, step: float) -> np.ndarray:
 
 @pytest.mark.parametrize("hold", [None, 1.5])
 def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, hold: float | None) -> None:
-    rows = wander(three_dof, 200, 15.0)
+    rows = random_waypoints(three_dof, 200, 15.0)
     trajectory = round_waypoints(three_dof, rows[0], rows[1:], 10.0, hold=hold)
     t = np.arange(0, trajectory.duration, 0.001)
     q = trajectory.q(t)
@@ -66,7 +66,7 @@ def test_what_makes_no_sense_is_refused(three_dof: Arm) -> None:
 
 
 def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = wander(three_dof, 60, 20.0)
+    rows = random_waypoints(three_dof, 60, 20.0)
     at_once = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )
@@ -88,7 +88,7 @@ def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monk
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 1000)
 
     def peak(count: int) -> int:
-        rows = wander(three_dof, count, 20.0)
+        rows = random_waypoints(three_dof, count, 20.0)
         tracemalloc.start()
         round_waypoints(three_dof, rows[0], rows[1:], 2.0, hold=1.5)
         _, most = tracemalloc.get_traced_memory()

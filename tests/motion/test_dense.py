@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from closed_curves import CENTRE, on_path, tips
+from closed_curves import CENTRE, executed_tips, on_path
 
 import armkin
 from armkin.errors import UsageError
@@ -27,26 +27,26 @@ def three_dof() -> Arm:
     return armkin.load("robots/three_dof.yaml")
 
 
-def circle(count: int, radius: float = 50.0) -> np.ndarray:
+def circle_points(count: int, radius: float = 50.0) -> np.ndarray:
     a = np.linspace(0, 2 * np.pi, count + 1)
     return np.asarray(CENTRE + radius * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1))
 
 
-def spiral(count: int) -> np.ndarray:
+def spiral_points(count: int) -> np.ndarray:
     a = np.linspace(0, 10 * np.pi, count)
     return np.asarray(CENTRE + (10 + a)[:, None] * np.stack([np.cos(a), np.sin(a), 0 * a], axis=1))
 
 
-def lissajous(count: int) -> np.ndarray:
+def lissajous_points(count: int) -> np.ndarray:
     a = np.linspace(0, 2 * np.pi, count)
     return np.asarray(CENTRE + 60 * np.stack([np.sin(3 * a), np.sin(2 * a + 0.9), 0 * a], axis=1))
 
 
-def square() -> np.ndarray:
+def square_points() -> np.ndarray:
     return np.asarray(CENTRE + 40 * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 0]]))
 
 
-def stadium() -> np.ndarray:
+def stadium_points() -> np.ndarray:
     a = np.linspace(-np.pi / 2, np.pi / 2, 40)
     bend = np.stack([30 + 20 * np.cos(a), 20 * np.sin(a), 0 * a], axis=1)
     return np.asarray(CENTRE + np.concatenate([[[-50, -20, 0]], bend, [[-50, 20, 0]]]))
@@ -57,7 +57,7 @@ def to_segment(p: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(p - a - f[:, None] * (b - a), axis=1))
 
 
-def sagitta(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
+def chord_sagitta(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
     """Of the chord a b, by the circle through it and c."""
     area = float(np.linalg.norm(np.cross(b - a, c - a))) / 2
     L, M, N = (float(np.linalg.norm(x)) for x in (b - a, c - b, c - a))
@@ -89,7 +89,7 @@ def worst_miss(points: np.ndarray, way: np.ndarray, tolerance: float) -> tuple[f
         for neighbour, corner in ((k - 1, k), (k + 1, k + 1)):
             if 0 <= neighbour < len(step) and turned[corner] <= CORNER and size[neighbour] >= size[k] / 3:
                 c = points[k - 1] if neighbour < k else points[k + 2]
-                allowed = max(allowed, sagitta(points[k], points[k + 1], c))
+                allowed = max(allowed, chord_sagitta(points[k], points[k + 1], c))
         beside = way[passed[k + 1] : passed[k + 2] + 1]
         excess = max(excess, float(to_segment(beside, points[k], points[k + 1]).max() - allowed))
     return far, excess
@@ -98,13 +98,13 @@ def worst_miss(points: np.ndarray, way: np.ndarray, tolerance: float) -> tuple[f
 @pytest.mark.parametrize(
     ("points", "smooth", "share"),
     [
-        (circle(100), circle(2000), 1.02),
-        (circle(60, 1.0), circle(2000, 1.0), 1.02),
-        (spiral(1500), spiral(15_000), 1.02),
-        (lissajous(400), lissajous(15_000), 1.02),
-        (spiral(1500) + np.random.default_rng(1).uniform(-0.02, 0.02, (1500, 3)), spiral(15_000), 1.05),
-        (square(), square(), 1.0001),
-        (stadium(), stadium(), 1.0001),
+        (circle_points(100), circle_points(2000), 1.02),
+        (circle_points(60, 1.0), circle_points(2000, 1.0), 1.02),
+        (spiral_points(1500), spiral_points(15_000), 1.02),
+        (lissajous_points(400), lissajous_points(15_000), 1.02),
+        (spiral_points(1500) + np.random.default_rng(1).uniform(-0.02, 0.02, (1500, 3)), spiral_points(15_000), 1.05),
+        (square_points(), square_points(), 1.0001),
+        (stadium_points(), stadium_points(), 1.0001),
     ],
     ids=["circle", "small circle", "spiral", "lissajous", "noise", "square", "stadium"],
 )
@@ -112,7 +112,7 @@ def test_dense_points_are_one_curve_within_the_measure(
     three_dof: Arm, points: np.ndarray, smooth: np.ndarray, share: float
 ) -> None:
     plan = armkin.path(three_dof, points, corners="tolerance")
-    way = tips(plan)
+    way = executed_tips(plan)
     far, excess = worst_miss(points, way, plan.tolerance)
     assert far <= plan.tolerance + 1e-3  # the way is looked at in steps
     assert excess <= plan.tolerance + 1e-3
@@ -124,7 +124,7 @@ def test_dense_points_are_one_curve_within_the_measure(
 
 def test_the_circle_s_points_take_no_longer_than_the_circle(three_dof: Arm) -> None:
     exact = {"moves": [{"point": [390, 80, 300]}, {"circle": {"centre": [340, 80, 300]}}]}
-    plan = armkin.path(three_dof, circle(100), corners="tolerance")
+    plan = armkin.path(three_dof, circle_points(100), corners="tolerance")
     assert on_path(plan) <= 1.002 * on_path(armkin.path(three_dof, exact))
 
 
@@ -183,7 +183,7 @@ def test_a_blend_that_does_not_fit_is_made_smaller(three_dof: Arm) -> None:
 
 
 def test_a_spline_takes_many_points(three_dof: Arm) -> None:
-    points = spiral(5000).tolist()
+    points = spiral_points(5000).tolist()
     plan = armkin.path(three_dof, {"moves": [{"point": points[0]}, {"spline": points[1:]}]})
     assert plan.deviation <= plan.tolerance
 
@@ -217,7 +217,7 @@ def test_many_rests_are_planned_at_once_as_each_alone(
     np.testing.assert_allclose(tip, saw, atol=1e-6)
 
 
-def ragged(seed: int) -> np.ndarray:
+def ragged_chords(seed: int) -> np.ndarray:
     """Chords of 0.1 to 30 mm one after another, as slicers mix them, with small turns and corners."""
     rng = np.random.default_rng(seed)
     length = np.exp(rng.uniform(np.log(0.1), np.log(30), 40))
@@ -230,7 +230,7 @@ def ragged(seed: int) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(12))
 def test_long_chords_beside_short_ones_are_kept_to(seed: int) -> None:
     """A spline with a knot at each place that it is held to swung 9 mm out between them."""
-    points = ragged(seed)
+    points = ragged_chords(seed)
     curve = fit_points.fit_curves(points, 0.05)
     u = np.unique(np.concatenate([curve.parameters, np.linspace(curve.begin[0], curve.begin[-1], 20_000)]))
     far, excess = worst_miss(points, curve.values(u)[0], 0.05)
@@ -246,7 +246,7 @@ def test_blends_that_share_a_side_s_middle_are_planned(three_dof: Arm) -> None:
     assert plan.deviation <= 0.05
     assert np.isfinite(plan.duration)
     assert (plan.limits["accel"] <= 1.002).all()
-    assert worst_miss(points, tips(plan), 0.05)[0] <= 0.05
+    assert worst_miss(points, executed_tips(plan), 0.05)[0] <= 0.05
 
 
 def test_lines_between_tight_bends_are_as_fast_as_on_a_far_finer_grid(
@@ -294,7 +294,9 @@ def test_an_empty_cell_of_blend_or_speed_leaves_it_to_what_is_said_of_all(three_
 
 
 def test_a_way_shown_with_too_few_samples_is_shown_best_where_it_bends_most(three_dof: Arm) -> None:
-    plan = armkin.path(three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle(60, 20.0)]), corners="tolerance")
+    plan = armkin.path(
+        three_dof, np.concatenate([[CENTRE - [0, 240, 0]], circle_points(60, 20.0)]), corners="tolerance"
+    )
     begins = plan.motion.begins.tolist()
     all_times, deviation = playback_times.sample_times(three_dof, plan, begins, 0.02, 10_000)
     assert deviation <= 0.02

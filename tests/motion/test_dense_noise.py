@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_curves import CENTRE, harmonics, on_path, tips
+from closed_curves import CENTRE, executed_tips, harmonic_curve, on_path
 
 import armkin
 from armkin.motion.tool_path import fit_points
@@ -15,9 +15,9 @@ def three_dof() -> armkin.Arm:
     return armkin.load("three_dof")
 
 
-def loops(seed: int, count: int) -> np.ndarray:
+def loop_points(seed: int, count: int) -> np.ndarray:
     """A random closed curve in reach; that of seed 4 has bends of 1 mm, where 600 points are 0.05 mm apart."""
-    return np.asarray(CENTRE - [0, 40, 0] + np.pad(harmonics(seed, count), ((0, 0), (0, 1))))
+    return np.asarray(CENTRE - [0, 40, 0] + np.pad(harmonic_curve(seed, count), ((0, 0), (0, 1))))
 
 
 def test_noise_is_no_corner_and_a_small_square_is() -> None:
@@ -46,19 +46,19 @@ def test_noise_in_a_tight_bend_is_no_corner() -> None:
 
 def test_noise_in_tight_bends_takes_little_time(three_dof: armkin.Arm) -> None:
     """1.059 of the smooth curve's time: four points of a bend were corners, with sides of 0.05 mm to be rounded in."""
-    exact = loops(4, 600)
+    exact = loop_points(4, 600)
     points = exact + np.random.default_rng(19).uniform(-0.02, 0.02, exact.shape)
     plan = armkin.path(three_dof, points, corners="tolerance")
     assert plan.deviation <= plan.tolerance
-    assert on_path(plan) <= 1.04 * on_path(armkin.path(three_dof, loops(4, 20_000), corners="tolerance"))
-    way, index = tips(plan), 0
+    assert on_path(plan) <= 1.04 * on_path(armkin.path(three_dof, loop_points(4, 20_000), corners="tolerance"))
+    way, index = executed_tips(plan), 0
     for point in points:  # in order: each behind the first place where the one before it is passed
         index += int(np.flatnonzero(np.linalg.norm(way[index:] - point, axis=1) <= plan.tolerance + 1e-3)[0])
 
 
 def test_noise_that_leaves_the_tolerance_never_brings_the_law_to_rest(three_dof: armkin.Arm) -> None:
     """The greatest speed before a bend led to rest behind it, where the law stood for 1e298 s."""
-    points, rng = loops(0, 600), np.random.default_rng(1)
+    points, rng = loop_points(0, 600), np.random.default_rng(1)
     rng.uniform(size=points.shape)
     plan = armkin.path(three_dof, points + rng.normal(0, 0.02, points.shape), corners="tolerance")
     assert plan.duration < 7

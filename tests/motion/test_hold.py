@@ -12,7 +12,7 @@ from armkin.motors import motor_accel
 CIRCLE = {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]}
 
 
-def asked(plan: armkin.PathPlan) -> float:
+def hold_acceleration(plan: armkin.PathPlan) -> float:
     """Greatest share of max_accel that a joint is asked for when the arm is held anywhere on the plan's curves.
 
     By finite differences of the way alone: the leading motor slows down with 5/8 of its greatest acceleration, as the
@@ -39,8 +39,8 @@ def asked(plan: armkin.PathPlan) -> float:
 @pytest.mark.parametrize(("hold", "most"), [(1.5, 1.52), (1.0, 1.02)])
 def test_a_hold_asks_for_no_more_than_it_may(hold: float, most: float) -> None:
     arm = armkin.load("three_dof")
-    assert asked(armkin.path(arm, CIRCLE, hold=hold)) <= most
-    assert asked(armkin.path(arm, CIRCLE, hold=None)) > most + 0.1  # without the cap it does
+    assert hold_acceleration(armkin.path(arm, CIRCLE, hold=hold)) <= most
+    assert hold_acceleration(armkin.path(arm, CIRCLE, hold=None)) > most + 0.1  # without the cap it does
 
 
 def test_the_cap_costs_little() -> None:

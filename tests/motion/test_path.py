@@ -23,7 +23,7 @@ def three_dof() -> Arm:
     return armkin.load("robots/three_dof.yaml")
 
 
-def executed(plan: PathPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def executed_samples(plan: PathPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Joint values every millisecond; the speeds and accelerations of their differences, as shares of the limits."""
     q = plan.q(np.arange(0.0, plan.duration, 0.001))
     v = np.diff(q, axis=0) / 0.001
@@ -33,7 +33,7 @@ def executed(plan: PathPlan) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_a_circle_is_followed_within_every_limit(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, {"moves": [{"point": [390, 80, 300]}, CIRCLE]}, start=three_dof.home)
-    q, v, a = executed(plan)
+    q, v, a = executed_samples(plan)
     assert v.max() <= 1.002
     assert a.max() <= 1.002
     assert max(v.max(), a.max()) > 0.99  # and nothing is left unused
@@ -61,7 +61,7 @@ def test_all_moves_together_end_where_they_shall(three_dof: Arm, jerk: float | N
         {"joint": "home"},
     ]
     plan = armkin.path(three_dof, {"moves": moves, "blend": 5, "start": "home"}, jerk=jerk)
-    q, v, a = executed(plan)
+    q, v, a = executed_samples(plan)
     assert v.max() <= 1.002
     assert a.max() <= 1.002
     assert np.abs(np.diff(q, axis=0)).max() < 0.01
@@ -148,7 +148,7 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
 
 def test_a_path_that_begins_on_a_boundary_is_carried_by_the_branches_that_meet_there(three_dof: Arm) -> None:
     plan = armkin.path(three_dof, {"start": {"joints": [0, 0, 0]}, "moves": [{"line": [400, 10, 170]}]})
-    q, v, a = executed(plan)
+    q, v, a = executed_samples(plan)
     assert v.max() <= 1.002
     assert a.max() <= 1.002
     assert q[0] == pytest.approx([0, 0, 0], abs=1e-9)

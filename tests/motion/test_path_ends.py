@@ -18,7 +18,7 @@ from armkin.motion.branches.branch_columns import Samples
 
 
 @cache  # what is prepared of an arm is kept by arm
-def moving(name: str) -> Arm:
+def arm_with_rates(name: str) -> Arm:
     """An arm with rates, ours where its file has none."""
     arm = armkin.load(name)
     speed, accel = (np.where(np.isnan(x), 2.0, x) for x in (arm.max_speed, arm.max_accel))
@@ -53,7 +53,7 @@ def test_both_branches_go_on_from_a_boundary_and_end_on_it(joints: tuple[float, 
 @pytest.mark.parametrize("name", ["ar4", "irb120", "irb2400", "kuka_kr6_r700", "fanuc_crx10ia"])
 def test_a_singular_home_is_left_or_the_wrist_turns_first(name: str) -> None:
     """20 mm up and 20 mm sideways; --split turns the wrist at rest where the straight way makes the joints jump."""
-    arm = moving(name)
+    arm = arm_with_rates(name)
     home = armkin.fk(arm, arm.home)[:3, 3]
     up, sideways = ({"start": "home", "moves": [{"offset": {"xyz": way}}]} for way in ([0, 0, 20], [0, 20, 0]))
     plan = armkin.path(arm, up)
@@ -80,7 +80,7 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
         return joined(a, b)
 
     monkeypatch.setattr(boundary_chains, "_join_chains", counted)
-    arm = moving("mycobot_280")
+    arm = arm_with_rates("mycobot_280")
     plan = armkin.path(arm, {"start": "home", "moves": [{"offset": {"xyz": [0, 0, -20]}}]})
     down = armkin.fk(arm, arm.home)[:3, 3] - np.array([0, 0, 20])
     np.testing.assert_allclose(armkin.fk(arm, plan.q(plan.duration))[:3, 3], down, atol=0.01)

@@ -100,7 +100,7 @@ def test_free_joints_stay_where_the_whole_way_is_singular(name: str) -> None:
     assert np.ptp(q[:, 1]) == pytest.approx(0.4, abs=1e-6)
 
 
-def beside(arm: armkin.Arm, q: list[float], distance: float, turn: float) -> tuple[armkin.PathPlan, np.ndarray]:
+def plan_beside(arm: armkin.Arm, q: list[float], distance: float, turn: float) -> tuple[armkin.PathPlan, np.ndarray]:
     """A line of 170 mm that passes a singular posture at so many mm, and where it begins and ends."""
     ends = np.tile(armkin.fk(arm, q), (2, 1, 1))
     ends[:, :3, 3] += np.array([[-60.0, -60, 0], [60, 60, 0]]) + distance * np.array([0.3, 0.5, 0.7])
@@ -115,10 +115,10 @@ QS["ar4"] = QS["irb120"]
 
 @cache
 def straight_through(name: str) -> armkin.PathPlan:
-    return beside(with_rates(name), QS[name], 0.0, 0.0)[0]
+    return plan_beside(with_rates(name), QS[name], 0.0, 0.0)[0]
 
 
-def seconds(plan: armkin.PathPlan) -> float:
+def line_seconds(plan: armkin.PathPlan) -> float:
     """Of the line alone: before it the arm goes from home to where it begins."""
     return sum(stretch.duration for stretch, _ in plan.on_path.values())
 
@@ -134,9 +134,9 @@ def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(
 ) -> None:
     """The tool turned a little and its tip on the line, or, where it may not be turned, aside within the tolerance."""
     arm = with_rates(name)
-    plan, ends = beside(arm, QS[name], distance, turn)
+    plan, ends = plan_beside(arm, QS[name], distance, turn)
     slack = 1.05 if distance == 1.0 else 1.002
-    assert seconds(plan) <= slack * seconds(straight_through(name))
+    assert line_seconds(plan) <= slack * line_seconds(straight_through(name))
     assert (plan.turned is not None) == (turn > 0)
     t = np.linspace(0.0, plan.duration, 4001)
     t = t[plan.s(t) > 0]
@@ -155,7 +155,7 @@ def test_beside_a_singularity_a_line_takes_as_long_as_straight_through_it(
 
 def test_a_plan_says_where_and_how_a_singularity_is_passed() -> None:
     for turn, how in ((0.0, "the tip at most 0.0045 mm aside"), (0.002, "the tool turned by at most 0.0017 deg")):
-        plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
+        plan, _ = plan_beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
         [line] = wrist_pass_lines(plan)
         assert line.startswith("a wrist singularity is passed between 35.817 and 134.741 mm: ")
         assert how in line
@@ -168,7 +168,7 @@ def test_a_plan_says_where_and_how_a_singularity_is_passed() -> None:
 
 def test_a_picture_says_how_a_singularity_is_passed(tmp_path: Path) -> None:
     for turn, how in ((0.0, "tip 0.0045 mm aside"), (0.002, "tool turned by 0.0017 deg")):
-        plan, _ = beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
+        plan, _ = plan_beside(with_rates("puma560"), QS["puma560"], 0.01, turn)
         plot_path(plan, str(tmp_path / "plan.svg"))
         caption = f"straight through a wrist singularity, 36 to 135 mm: {how}"
         assert caption in (tmp_path / "plan.svg").read_text()
@@ -177,12 +177,12 @@ def test_a_picture_says_how_a_singularity_is_passed(tmp_path: Path) -> None:
 def test_nothing_goes_along_the_line_faster_than_its_slowest_joint_alone() -> None:
     """The Puma's joint 3 turns by 18.84 degrees one way, from rest to rest: 0.528 s at 270 deg/s2."""
     arm = with_rates("puma560")
-    plan, _ = beside(arm, QS["puma560"], 0.01, 0.002)
+    plan, _ = plan_beside(arm, QS["puma560"], 0.01, 0.002)
     stretch, _ = plan.on_path[max(plan.on_path)]
     travel = np.abs(stretch.end - stretch.start)
     least = float((2 * np.sqrt(travel / arm.max_accel)).max())
     assert least == pytest.approx(0.528, abs=1e-3)
-    assert least <= seconds(plan) <= 1.002 * least
+    assert least <= line_seconds(plan) <= 1.002 * least
 
 
 def test_a_line_a_micrometre_beside_a_singularity_is_carried_where_a_limit_forbids_the_swing() -> None:
@@ -194,7 +194,7 @@ def test_a_line_a_micrometre_beside_a_singularity_is_carried_where_a_limit_forbi
 
 
 def test_no_tool_is_turned_farther_than_allowed_and_only_wrists_are() -> None:
-    plan, _ = beside(with_rates("puma560"), [0.3, -0.8, 0.5, 0.4, 0.0, 0.2], 1.0, 0.002)
+    plan, _ = plan_beside(with_rates("puma560"), [0.3, -0.8, 0.5, 0.4, 0.0, 0.2], 1.0, 0.002)
     assert plan.turned is None
     with pytest.raises(UsageError, match="turn_tolerance is for arms with six joints that turn"):
         armkin.path(armkin.load("three_dof"), {"turn_tolerance": 0.1, "moves": [{"line": [390, 80, 300]}]})
@@ -202,7 +202,7 @@ def test_no_tool_is_turned_farther_than_allowed_and_only_wrists_are() -> None:
 
 @pytest.mark.parametrize("name", ["ar4", "irb120"])
 def test_a_line_straight_through_a_singularity_is_carried_whole(name: str) -> None:
-    plan, _ = beside(with_rates(name), [0.3, 0.3, 0.2, 0.5, 0.0, 0.3], 0.0, 0.0)
+    plan, _ = plan_beside(with_rates(name), [0.3, 0.3, 0.2, 0.5, 0.0, 0.3], 0.0, 0.0)
     assert len(plan.runs) == 1
     assert plan.turned is None
 
@@ -210,7 +210,7 @@ def test_a_line_straight_through_a_singularity_is_carried_whole(name: str) -> No
 @pytest.mark.parametrize("name", ["irb120", "ar4"])
 def test_nearer_to_a_singularity_is_hardly_slower(name: str) -> None:
     """Joint 4 turns by half a turn in any case; where its cubics wavered, 0.01 mm took 9 % longer than 0.1."""
-    off = [beside(with_rates(name), [0.3, 0.3, 0.2, 0.5, 0.0, 0.3], off, 0.0)[0].duration for off in (1e-2, 1e-1)]
+    off = [plan_beside(with_rates(name), [0.3, 0.3, 0.2, 0.5, 0.0, 0.3], off, 0.0)[0].duration for off in (1e-2, 1e-1)]
     assert off[0] <= 1.03 * off[1]
 
 

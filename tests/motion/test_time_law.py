@@ -11,7 +11,7 @@ import armkin
 from armkin.motion.timing.time_optimal import knots_of_samples
 
 
-def way(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
+def wave_samples(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
     """A sum of a few waves: smooth, and known wherever it is asked for."""
     rng = np.random.default_rng(seed)
     size, phase = rng.normal(size=(4, n)) / 3, rng.uniform(0, 2 * np.pi, (4, n))
@@ -24,9 +24,9 @@ def way(seed: int, samples: int, n: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("seed", range(3))
 def test_few_samples_cost_little_time_and_no_limit(seed: int, samples: int) -> None:
     arm = armkin.load("three_dof")
-    s, q = way(seed, samples, arm.n)
+    s, q = wave_samples(seed, samples, arm.n)
     law = armkin.time_law(arm, q, s)
-    s, q = way(seed, 3000, arm.n)
+    s, q = wave_samples(seed, 3000, arm.n)
     assert law.duration <= (1 + 0.36 / samples) * armkin.time_law(arm, q, s).duration
     t = np.linspace(0.0, law.duration, 20_000)
     assert np.abs(law.qd(t) / arm.max_speed).max() <= 1.002
@@ -36,7 +36,7 @@ def test_few_samples_cost_little_time_and_no_limit(seed: int, samples: int) -> N
 def test_a_long_way_takes_little_memory_beside_its_own() -> None:
     """What is made of a way of 100,000 samples is kept; what is made on the way there is made in parts."""
     arm = armkin.load("three_dof")
-    s, q = way(0, 100_000, arm.n)
+    s, q = wave_samples(0, 100_000, arm.n)
     tracemalloc.start()
     law = armkin.time_law(arm, q, s)
     kept_bytes, most = tracemalloc.get_traced_memory()
@@ -47,7 +47,7 @@ def test_a_long_way_takes_little_memory_beside_its_own() -> None:
 
 
 def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    s, q = way(1, 500, 3)
+    s, q = wave_samples(1, 500, 3)
     knots = knots_of_samples(s, q, (100, 250))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 37)
     np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, knots.d)

@@ -21,7 +21,7 @@ from command_line import run
 AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def moves(text: str, **options: Any) -> list[tuple[str, Any]]:
+def rounded_moves(text: str, **options: Any) -> list[tuple[str, Any]]:
     """Kinds and values of the moves, polylines and targets rounded."""
     listed: list[tuple[str, Any]] = []
     for move in gcode.parse_gcode(text.encode(), "t.gcode", AS_IT_IS, DrawingOptions(**options)).moves:
@@ -32,10 +32,10 @@ def moves(text: str, **options: Any) -> list[tuple[str, Any]]:
     return listed
 
 
-def ends(text: str) -> list[list[float]]:
+def line_ends(text: str) -> list[list[float]]:
     """Where each line ends, the jump to the first point included."""
     points: list[list[float]] = []
-    for kind, value in moves(text):
+    for kind, value in rounded_moves(text):
         points += [value] if kind == "point" else value if kind == "polyline" else []
     return points
 
@@ -59,7 +59,7 @@ def ends(text: str) -> list[list[float]]:
     ],
 )
 def test_modal_state_is_that_of_rs_274(text: str, points: list[list[float]]) -> None:
-    assert ends(text) == points
+    assert line_ends(text) == points
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_modal_state_is_that_of_rs_274(text: str, points: list[list[float]]) -> 
     ],
 )
 def test_arcs(text: str, via: tuple[float, ...], to: tuple[float, ...]) -> None:
-    kind, value = moves(text)[-1]
+    kind, value = rounded_moves(text)[-1]
     assert kind == "arc"
     assert value.via == pytest.approx(via, abs=1e-9)
     assert value.to == pytest.approx(to, abs=1e-9)
@@ -104,7 +104,7 @@ def test_a_printed_centre_becomes_as_far_from_both_ends(plane: tuple[int, int, i
 
 
 def test_circles_and_helices() -> None:
-    kind, value = moves("G0 X10 Y0\nG2 I-10 Z6 P2")[-1]
+    kind, value = rounded_moves("G0 X10 Y0\nG2 I-10 Z6 P2")[-1]
     assert (kind, value.turns, value.rise) == ("circle", -2.0, 6.0)
     assert value.centre == [0, 0, 0]
     assert value.normal == [0, 0, 1]
@@ -113,7 +113,7 @@ def test_circles_and_helices() -> None:
 @pytest.mark.parametrize("end", ["0.00001", "-0.00003"])
 def test_a_circle_whose_end_is_rounded_is_that_circle(end: str) -> None:
     """Of an inch's rounding: three points, two of them beside each other across the circle, were on another one."""
-    kind, value = moves(f"G0 X10.00004 Y0\nG3 X10 Y{end} I-7 J7")[-1]
+    kind, value = rounded_moves(f"G0 X10.00004 Y0\nG3 X10 Y{end} I-7 J7")[-1]
     assert kind == "circle"
     assert value.centre == pytest.approx([3, 7, 0], abs=1e-4)
     assert value.turns == pytest.approx(1, abs=1e-5)
@@ -124,9 +124,9 @@ def test_a_checksum_counts_the_comments_before_it(comment: str) -> None:
     line, check = f"N1 G1{comment} X5", 0
     for byte in line.encode():
         check ^= byte
-    assert ends(f"G0 X1\n{line}*{check} ; and none behind * it") == [[1, 0, 0], [5, 0, 0]]
+    assert line_ends(f"G0 X1\n{line}*{check} ; and none behind * it") == [[1, 0, 0], [5, 0, 0]]
     with pytest.raises(PathFileError, match=r"t\.gcode:2: its checksum is"):
-        ends(f"G0 X1\n{line}*{check ^ 1}")
+        line_ends(f"G0 X1\n{line}*{check ^ 1}")
 
 
 def test_events_and_speeds() -> None:
@@ -177,7 +177,7 @@ def test_the_number_of_a_cam_program_is_noted_and_a_macro_of_that_letter_refused
 def test_a_program_has_as_many_points_as_any_path() -> None:
     """A million lines took minutes and gigabytes, as no other kind of file may."""
     with pytest.raises(PathFileError, match=r"t\.gcode:120003: is behind 120000 points, and a path has no more"):
-        ends("G1 X1\nX2\n" * 65_000)
+        line_ends("G1 X1\nX2\n" * 65_000)
 
 
 def test_a_cycle_that_ends_leaves_the_motion_as_it_was() -> None:
@@ -231,7 +231,7 @@ def test_home_takes_the_flags_that_slicers_give_it() -> None:
 )
 def test_what_is_refused_names_line_and_word(text: str, words: str) -> None:
     with pytest.raises(PathFileError, match=words):
-        moves(text)
+        rounded_moves(text)
 
 
 def test_the_plan_draws_what_the_program_says(tmp_path: Path) -> None:

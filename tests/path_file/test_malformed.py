@@ -18,7 +18,7 @@ _JUNK = [b"1e999", b"-", b"nan", b"(", b"%", b"<g>", b"\0", b"\xff\xfe", b"N1*5"
 _MARKUP = re.compile(rb"[<>&\"\0]")
 
 
-def damaged(text: str, rng: np.random.Generator, markup: bool) -> bytes:
+def damage_text(text: str, rng: np.random.Generator, markup: bool) -> bytes:
     """A file with one to five bytes or words put in, taken out or doubled; markup: not between an XML file's quotes."""
     raw = bytearray(text.encode())
     for _ in range(rng.integers(1, 6)):
@@ -44,10 +44,12 @@ def damaged(text: str, rng: np.random.Generator, markup: bool) -> bytes:
 def test_what_is_damaged_is_read_or_refused_with_its_line(kind: str) -> None:
     rng, refused = np.random.default_rng(24), []
     make, parse = (
-        (random_drawings.program, gcode.parse_gcode) if kind == "gcode" else (random_drawings.drawing, svg.parse_svg)
+        (random_drawings.random_program, gcode.parse_gcode)
+        if kind == "gcode"
+        else (random_drawings.random_drawing, svg.parse_svg)
     )
     for seed in range(40):
-        raw = damaged(make(seed), rng, kind != "attributes")
+        raw = damage_text(make(seed), rng, kind != "attributes")
         try:
             parse(raw, "t", AS_IT_IS, DrawingOptions())
         except PathFileError as error:

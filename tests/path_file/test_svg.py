@@ -16,7 +16,7 @@ AS_IT_IS = Placing((0.0, 0.0, 0.0), ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0
 BOX = 'viewBox="0 0 100 100" width="100mm" height="100mm"'
 
 
-def drawn(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
+def drawn_points(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
     """All points, (N, 3) [mm]."""
     text = f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="x" {head}>\n{body}</svg>'
     points: list[list[float]] = []
@@ -42,7 +42,7 @@ def drawn(body: str, head: str = BOX, lift: float = 0.0) -> np.ndarray:
     ],
 )
 def test_shapes_with_corners(body: str, points: list[list[float]]) -> None:
-    corners = drawn(body)[:, :2]
+    corners = drawn_points(body)[:, :2]
     keep = np.append(True, np.abs(np.diff(corners, axis=0)).max(axis=1) > 1e-9)
     np.testing.assert_allclose(corners[keep], points, atol=1e-9)
 
@@ -57,7 +57,7 @@ def test_shapes_with_corners(body: str, points: list[list[float]]) -> None:
     ],
 )
 def test_round_shapes(body: str) -> None:
-    points = drawn(body)
+    points = drawn_points(body)
     np.testing.assert_allclose(np.hypot(points[:, 0] - 50, points[:, 1] - 50), 20, atol=1e-9)
     middle = (points[1:] + points[:-1]) / 2
     assert np.hypot(middle[:, 0] - 50, middle[:, 1] - 50).min() > 20 - 0.01
@@ -67,26 +67,30 @@ def test_curves() -> None:
     t = np.linspace(0, 1, 5000)[:, None]
     P = [np.array(p, dtype=float) for p in ((0, 100), (0, 90), (10, 90), (10, 100))]
     exact = (1 - t) ** 3 * P[0] + 3 * (1 - t) ** 2 * t * P[1] + 3 * (1 - t) * t**2 * P[2] + t**3 * P[3]
-    points = drawn('<path d="M0 0C0 10 10 10 10 0"/>')[:, :2]
+    points = drawn_points('<path d="M0 0C0 10 10 10 10 0"/>')[:, :2]
     assert max(np.linalg.norm(exact - p, axis=1).min() for p in (points[1:] + points[:-1]) / 2) < 0.01
-    smooth = drawn('<path d="M0 0C0 10 10 10 10 0S20-10 20 0"/>')[:, :2]
-    spelled = drawn('<path d="M0 0C0 10 10 10 10 0C10-10 20-10 20 0"/>')[:, :2]
+    smooth = drawn_points('<path d="M0 0C0 10 10 10 10 0S20-10 20 0"/>')[:, :2]
+    spelled = drawn_points('<path d="M0 0C0 10 10 10 10 0C10-10 20-10 20 0"/>')[:, :2]
     np.testing.assert_allclose(smooth, spelled, atol=1e-12)
     np.testing.assert_allclose(
-        drawn('<path d="M0 0q5 10 10 0t10 0"/>'), drawn('<path d="M0 0Q5 10 10 0Q15-10 20 0"/>'), atol=1e-12
+        drawn_points('<path d="M0 0q5 10 10 0t10 0"/>'),
+        drawn_points('<path d="M0 0Q5 10 10 0Q15-10 20 0"/>'),
+        atol=1e-12,
     )
 
 
 def test_units_and_the_frame() -> None:
     line = '<line x1="0" y1="0" x2="96" y2="0"/>'
-    np.testing.assert_allclose(drawn(line, 'width="2in" height="1in"')[:, :2], [[0, 25.4], [25.4, 25.4]], atol=1e-9)
-    boxed = drawn('<line x1="10" y1="20" x2="30" y2="20"/>', 'viewBox="10 10 40 20" width="80mm" height="40mm"')
+    np.testing.assert_allclose(
+        drawn_points(line, 'width="2in" height="1in"')[:, :2], [[0, 25.4], [25.4, 25.4]], atol=1e-9
+    )
+    boxed = drawn_points('<line x1="10" y1="20" x2="30" y2="20"/>', 'viewBox="10 10 40 20" width="80mm" height="40mm"')
     np.testing.assert_allclose(boxed[:, :2], [[0, 20], [40, 20]], atol=1e-9)
-    np.testing.assert_allclose(drawn(line, 'viewBox="0 0 96 96"')[:, :2], [[0, 25.4], [25.4, 25.4]], atol=1e-9)
+    np.testing.assert_allclose(drawn_points(line, 'viewBox="0 0 96 96"')[:, :2], [[0, 25.4], [25.4, 25.4]], atol=1e-9)
 
 
 def test_the_pen_is_lifted_between_strokes() -> None:
-    points = drawn('<path d="M0 100h10M20 100h10"/>', lift=5.0)
+    points = drawn_points('<path d="M0 100h10M20 100h10"/>', lift=5.0)
     assert points[:, 2].tolist() == [5, 0, 0, 5, 5, 0, 0, 5]
     assert points[:, 0].tolist() == [0, 0, 10, 10, 20, 20, 30, 30]
 
@@ -111,7 +115,7 @@ def test_the_pen_is_lifted_between_strokes() -> None:
 )
 def test_what_is_refused_names_line_and_element(body: str, words: str) -> None:
     with pytest.raises(PathFileError, match=words):
-        drawn(body)
+        drawn_points(body)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +157,7 @@ def test_entities_and_bombs_of_uses_are_refused() -> None:
     for k in range(1, 12):
         uses += f'<g id="g{k}">' + 10 * f'<use href="#g{k - 1}"/>' + "</g>"
     with pytest.raises(PathFileError, match="more than"):
-        drawn(f'<defs>{uses}</defs><use href="#g11"/>')
+        drawn_points(f'<defs>{uses}</defs><use href="#g11"/>')
 
 
 def test_a_drawing_is_planned(tmp_path: Path) -> None:

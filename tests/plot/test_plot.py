@@ -64,7 +64,7 @@ def millimetres_per_millimetre(axes: Any) -> np.ndarray:
     return np.asarray(length / length[0])
 
 
-def texts(figure: Any) -> list[str]:
+def texts_of(figure: Any) -> list[str]:
     words = [text.get_text() for text in figure.texts]
     for axes in figure.axes:
         legend = axes.get_legend()
@@ -103,8 +103,8 @@ def test_single_pose(tmp_path: Path, drawn: list[Any]) -> None:
     [axes] = figure.axes
     assert millimetres_per_millimetre(axes) == pytest.approx([1, 1, 1])
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()) == ("x / mm", "y / mm", "z / mm")
-    assert "three_dof" in texts(figure)
-    assert "tip (398.4, -218.5, 187.2) mm;  frames: x red, y green, z blue" in texts(figure)
+    assert "three_dof" in texts_of(figure)
+    assert "tip (398.4, -218.5, 187.2) mm;  frames: x red, y green, z blue" in texts_of(figure)
     # All of the arm is within the axes, and one line is its skeleton.
     paths = [np.array(line.get_data_3d()).T for line in axes.lines]
     assert any(path.shape == (5, 3) and np.allclose(path, skeleton(THREE_DOF, POSE).path) for path in paths)
@@ -128,8 +128,8 @@ def test_all_branches_of_a_target(tmp_path: Path, drawn: list[Any]) -> None:
     legal = {name for name, is_legal in zip(names, s.within_limits, strict=True) if is_legal}
     assert legal == {"left, elbow up", "left, elbow down"}
     labels = [name if name in legal else f"{name} (outside limits)" for name in names]
-    assert [text for text in texts(figure) if "elbow" in text] == labels
-    assert "target" in texts(figure)
+    assert [text for text in texts_of(figure) if "elbow" in text] == labels
+    assert "target" in texts_of(figure)
     lines = {line.get_label(): line for line in figure.axes[0].lines}
     for label in labels:
         assert (lines[label].get_linestyle() == "-") == ("outside" not in label)
@@ -140,7 +140,7 @@ def test_path(tmp_path: Path, drawn: list[Any]) -> None:
     poses = np.deg2rad([[a, 30 + a / 3, -40] for a in range(0, 70, 10)])
     plot_poses(THREE_DOF, poses, str(tmp_path / "path.svg"))
     [figure] = drawn
-    assert [text for text in texts(figure) if text in ("start", "end")] == ["start", "end"]
+    assert [text for text in texts_of(figure) if text in ("start", "end")] == ["start", "end"]
     tips = fk(THREE_DOF, poses)[:, :3, 3]
     ways = [np.array(line.get_data_3d()).T for line in figure.axes[0].lines]
     [way] = [way for way in ways if way.shape == (6 * 16 + 1, 3)]
@@ -159,7 +159,7 @@ def test_a_long_path_shows_some_arms_and_the_whole_way(tmp_path: Path, drawn: li
     assert max(np.array(line.get_data_3d()).shape[1] for line in figure.axes[0].lines) > 10_000
 
 
-def boxes(figure: Any) -> tuple[Any, Any]:
+def seen_boxes(figure: Any) -> tuple[Any, Any]:
     """What is seen of the axes in space, and the legend: [pixels]."""
     from armkin.plot.canvas import _visible_corners
 
@@ -191,7 +191,7 @@ def _is_seen_whole(arm: armkin.Arm, tmp_path: Path, drawn: list[Any]) -> None:
         if not hasattr(figure.axes[0], "get_zlim"):
             continue
         assert (figure.axes[0].elev, figure.axes[0].azim) == (drawn[0].axes[0].elev, drawn[0].axes[0].azim)
-        (low, high), legend = boxes(figure)
+        (low, high), legend = seen_boxes(figure)
         assert np.all(low >= 0)
         assert np.all(high <= figure.bbox.size)
         assert legend is None or legend.x1 <= low[0] + 1
@@ -243,8 +243,8 @@ def test_workspace_picture(tmp_path: Path, drawn: list[Any], surveyed: Workspace
     low, high = side.get_xlim()
     assert low <= 0
     assert high > np.hypot(*surveyed.tips[:, :2].T).max() * 0.99
-    assert any("40,000 samples" in text and "m³ ±" in text for text in texts(figure))
-    (least, greatest), _ = boxes(figure)
+    assert any("40,000 samples" in text and "m³ ±" in text for text in texts_of(figure))
+    (least, greatest), _ = seen_boxes(figure)
     assert np.all(least >= 0)
     assert greatest[0] < figure.bbox.width * 0.6
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import yaml
 from numpy.typing import NDArray
-from oracle import Goal, branches, screws
+from oracle import Goal, branches, screws_of
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
@@ -47,38 +47,38 @@ class Volume(NamedTuple):
     sigma: float
 
 
-def cells(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Cells:
+def count_cells(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Cells:
     """Random cells of a map with one orientation a cell, evenly in space."""
-    reach_map = armkin.reach(arm, grid=grid, azimuths=24, rolls=1, tool_down=_down(arm), measures=False)
+    reach_map = armkin.reach(arm, grid=grid, azimuths=24, rolls=1, tool_down=_has_orientation(arm), measures=False)
     cell, rng = reach_map.grid, np.random.default_rng(8)
     weight = np.repeat(cell.rings[:, 0] + 0.5, cell.azimuths)
     sampled = rng.choice(reach_map.cells, count, p=weight / weight.sum())
     turn = np.asarray((sampled % cell.azimuths) * (TURN / cell.azimuths), dtype=float)
     target = cell.targets(cell.rings[sampled // cell.azimuths], turn, np.zeros(count, int), np.zeros(count))
-    by_count = counted(cell, target, scene_of(scene, info), starts, seed=3)
+    by_count = count_targets(cell, target, scene_of(scene, info), starts, seed=3)
     differs = by_count.reached != (reach_map.share[sampled] == 1.0)
     return Cells(float(by_count.known.mean()), int((differs & by_count.known).sum()), float(by_count.reached.mean()))
 
 
-def volume(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Volume:
+def count_volume(arm: armkin.Arm, scene: Path, info: dict[str, Any], *, grid: float, count: int, starts: int) -> Volume:
     """Random places of the ball, with the map's orientation."""
-    reach_map = armkin.reach(arm, grid=grid, azimuths=36, rolls=1, tool_down=_down(arm), measures=False)
+    reach_map = armkin.reach(arm, grid=grid, azimuths=36, rolls=1, tool_down=_has_orientation(arm), measures=False)
     cell, rng = reach_map.grid, np.random.default_rng(9)
     place: Array = rng.normal(size=(count, 3))
     place *= (rng.uniform(size=count) ** (1 / 3) * arm.reach / np.linalg.norm(place, axis=1))[:, None]
     r, turn = np.hypot(place[:, 0], place[:, 1]), np.arctan2(place[:, 1], place[:, 0])
     ring: Array = np.stack([r / cell.step - 0.5, place[:, 2] / cell.step], axis=1)
     target = cell.targets(ring, turn, np.zeros(count, int), np.zeros(count))
-    share = float(counted(cell, target, scene_of(scene, info), starts, seed=4).reached.mean())
+    share = float(count_targets(cell, target, scene_of(scene, info), starts, seed=4).reached.mean())
     ball = 4 / 3 * np.pi * arm.reach**3
     return Volume(reach_map.volume_mm3 / ball, share, float(np.sqrt(share * (1 - share) / count)))
 
 
-def _down(arm: armkin.Arm) -> bool:
+def _has_orientation(arm: armkin.Arm) -> bool:
     return task_for(arm).orientation != "none"
 
 
-def counted(grid: Grid, targets: Array, scene: dict[str, Any], starts: int, seed: int) -> Counted:
+def count_targets(grid: Grid, targets: Array, scene: dict[str, Any], starts: int, seed: int) -> Counted:
     """Targets (N, ...) of `Grid.targets`; scene: floor [mm], boxes [(min, max)], clearance [mm]."""
     arm, task = grid.arm, grid.task
     T = np.tile(np.eye(4), (len(targets), 1, 1))
@@ -88,14 +88,14 @@ def counted(grid: Grid, targets: Array, scene: dict[str, Any], starts: int, seed
         T[:, : targets.shape[1], 3] = targets[:, :3]
     goals = Goal(task.position, task.sums, task.offsets, task.orientation, T, np.zeros((len(T), len(task.sums))))
     reached, is_known = np.zeros(len(T), bool), np.ones(len(T), bool)
-    for k, q in enumerate(branches(screws(arm.file), goals, starts, seed)):
-        far = depth(arm, legal(arm, q), scene)
+    for k, q in enumerate(branches(screws_of(arm.file), goals, starts, seed)):
+        far = clearance_depth(arm, legal_postures(arm, q), scene)
         reached[k] = bool((far > 0).any())
         is_known[k] = bool((far > CLOSE).any()) or not (np.abs(far) <= CLOSE).any()
     return Counted(reached, is_known)
 
 
-def legal(arm: armkin.Arm, q: Array) -> Array:
+def legal_postures(arm: armkin.Arm, q: Array) -> Array:
     """The postures (B, n) that have a copy by whole turns within limits, at that copy."""
     low, high = arm.lower - 1e-9, arm.upper + 1e-9
     turns = np.where(arm.prismatic, 0.0, np.ceil((low - q) / (2 * np.pi)))
@@ -103,7 +103,7 @@ def legal(arm: armkin.Arm, q: Array) -> Array:
     return np.asarray(q[((q >= low) & (q <= high)).all(axis=1)])
 
 
-def depth(arm: armkin.Arm, q: Array, scene: dict[str, Any]) -> Array:
+def clearance_depth(arm: armkin.Arm, q: Array, scene: dict[str, Any]) -> Array:
     """The least distance of anything from what it must not touch, `clearance` taken off: (B, n) -> (B,) [mm]."""
     frames = armkin.frames(arm, q)
     t = np.linspace(0.0, 1.0, POINTS)[:, None]

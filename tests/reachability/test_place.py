@@ -19,7 +19,7 @@ from armkin.reachability import place_path, place_targets, place_upright
 from armkin.reachability import place_search as places
 from armkin.reachability.place_arm import Obstacles, arm_at_place
 from command_line import ROOT, run
-from interrupted import interrupted
+from interrupted import interrupt_at
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof", "planar_3dof", "so101", "stanford"])
@@ -154,7 +154,7 @@ def test_places_are_a_file_that_goes_on_after_a_kill(tmp_path: Path, monkeypatch
     words = ("place", "three_dof", "roarm_m2", path, "--step", 200, "--yaw", 90)
     completed = run(*words, "--out", undisturbed)
     with monkeypatch.context() as patch:
-        patch.setattr(places, "count_chunk", interrupted(places.count_chunk, 5))
+        patch.setattr(places, "count_chunk", interrupt_at(places.count_chunk, 5))
         assert run(*words, "--out", resumed).code == 130
     refused = run("place", "three_dof", path, "--step", 100, "--out", resumed)
     assert refused.code == 2

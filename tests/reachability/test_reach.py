@@ -16,7 +16,7 @@ from armkin.reachability import voxels
 from armkin.reachability.cell_answers import TURN, Question, cell_columns
 from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
-from interrupted import interrupted
+from interrupted import interrupt_at
 
 ARMS = (
     "ur5e",
@@ -32,7 +32,7 @@ ARMS = (
 )
 
 
-def asked(grid: Grid, rings: np.ndarray) -> np.ndarray:
+def ask_each_pose(grid: Grid, rings: np.ndarray) -> np.ndarray:
     """share, share_any, branches, single of every cell, by asking each pose."""
     N, L = grid.directions_count, grid.rolls_count
     orientation, rows = np.arange(N * L), []
@@ -57,7 +57,7 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
     values_of = cell_columns(question, rings)
     assert question.by_arcs
     columns = np.stack([values_of[name] for name in ("share", "share_any", "branches", "single")], axis=1)
-    assert np.allclose(columns, asked(grid, rings), rtol=0, atol=1e-12, equal_nan=True)
+    assert np.allclose(columns, ask_each_pose(grid, rings), rtol=0, atol=1e-12, equal_nan=True)
     assert columns[:, 1].max() > 0
 
 
@@ -115,11 +115,13 @@ def test_the_share_under_keep_outs_is_what_another_count_finds() -> None:
     """Cells at random, asked again by multi-start Newton on screws and points along the bodies; then the volume."""
     scene = ROOT / "examples/scenes/three_dof.yaml"
     info = run("info", "three_dof", "--scene", scene, "--json").json
-    cells = monte_carlo.cells(armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=120, starts=20)
+    cells = monte_carlo.count_cells(armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=120, starts=20)
     assert cells.known > 0.97
     assert cells.different == 0
     assert 0.05 < cells.share < 0.6
-    volume = monte_carlo.volume(armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=250, starts=20)
+    volume = monte_carlo.count_volume(
+        armkin.load("three_dof", scene=scene), scene, info, grid=30.0, count=250, starts=20
+    )
     assert abs(volume.map - volume.counted) < 4 * volume.sigma
 
 
@@ -156,7 +158,7 @@ def test_a_voxel_takes_the_cell_that_its_centre_lies_in() -> None:
     assert side.table(reach_map.share).shape == (np.ptp(side.places[:, 1]) + 1, np.ptp(side.places[:, 0]) + 1)
 
 
-def reach(*more: object) -> Result:
+def run_reach(*more: object) -> Result:
     return run("reach", "puma560", "--grid", 300, "--azimuths", 6, "--directions", 8, "--rolls", 4, *more)
 
 
@@ -173,22 +175,22 @@ def test_engines_and_kills_change_no_byte(tmp_path: Path, monkeypatch: pytest.Mo
         return hashlib.sha256(path.read_bytes()).hexdigest()
 
     first, two, three = (tmp_path / f"{name}.{end}" for name in "abc")
-    assert reach("--out", first).code == 0
-    assert reach("--out", two, "--workers", 2).code == 0
+    assert run_reach("--out", first).code == 0
+    assert run_reach("--out", two, "--workers", 2).code == 0
     with monkeypatch.context() as patch:
-        patch.setattr(maps, "answer_chunk", interrupted(maps.answer_chunk, 4))
-        assert reach("--out", three).code == 130
+        patch.setattr(maps, "answer_chunk", interrupt_at(maps.answer_chunk, 4))
+        assert run_reach("--out", three).code == 130
     assert (tmp_path / f"c.{end}.parts" / "00000002").exists()
     completed = run("reach", "puma560", "--grid", 200, "--out", three)
     assert completed.code == 2
     assert "belongs to another job: " in completed.err
-    assert reach("--out", three).code == 0
+    assert run_reach("--out", three).code == 0
     assert digest(first) == digest(two) == digest(three)
     assert {path.name for path in tmp_path.iterdir()} == {f"{name}.{end}" for name in "abc"}
 
 
 def test_a_picture_of_the_section_and_a_slice(tmp_path: Path) -> None:
-    assert reach("--plot", tmp_path / "reach.png").code == 0
+    assert run_reach("--plot", tmp_path / "reach.png").code == 0
     assert (tmp_path / "reach.png").stat().st_size > 20_000
 
 

@@ -31,24 +31,24 @@ FREE = (-math.inf, math.inf)
 TURN_X, TURN_Y = transform((0, 0, 0), (90, 0, 0)), transform((0, 0, 0), (0, 90, 0))
 
 
-def chain(*links: np.ndarray, kinds: str, limits: Sequence[Any]) -> Arm:
+def chain_arm(*links: np.ndarray, kinds: str, limits: Sequence[Any]) -> Arm:
     """An arm of R and P joints with limits in degrees and mm."""
     scale = [[1.0] if kind == "P" else [math.pi / 180] for kind in kinds]
     return from_links(np.array(links), [k == "P" for k in kinds], limits=np.array(limits) * scale)
 
 
-def along(x: float) -> np.ndarray:
+def shift_along_x(x: float) -> np.ndarray:
     return transform((x, 0, 0), (0, 0, 0))
 
 
 def planar_2r(*limits: tuple[float, float]) -> Arm:
-    return chain(np.eye(4), along(200), along(300), kinds="RR", limits=list(limits))
+    return chain_arm(np.eye(4), shift_along_x(200), shift_along_x(300), kinds="RR", limits=list(limits))
 
 
 def yaw_2r(*limits: tuple[float, float], base: np.ndarray | None = None) -> Arm:
     """A yaw and two links in its plane: everything between two spheres."""
     first = np.eye(4) if base is None else base
-    return chain(first, TURN_X, along(200), along(300), kinds="RRR", limits=list(limits))
+    return chain_arm(first, TURN_X, shift_along_x(200), shift_along_x(300), kinds="RRR", limits=list(limits))
 
 
 ANNULUS = math.pi * (500**2 - 100**2)
@@ -57,8 +57,8 @@ TUBE = math.pi * (300**2 - 100**2) * 200
 TILTED = transform((100, 200, 300), (30, 40, 50))
 WRIST = [
     TURN_X,
-    along(200),
-    along(300) @ TURN_Y,
+    shift_along_x(200),
+    shift_along_x(300) @ TURN_Y,
     TURN_X,
     TURN_X,
     transform((0, 0, 80), (0, 0, 0)) @ np.eye(4),
@@ -74,19 +74,19 @@ KNOWN = {
     "yaw of 90": (yaw_2r((-45, 45), FREE, FREE), SHELL / 2, 0.01),
     "yaw of 5": (yaw_2r((-2.5, 2.5), FREE, FREE), SHELL / 36, 0.01),
     "yaw of 240, forwards and backwards": (yaw_2r((-120, 120), FREE, FREE), SHELL, 0.005),
-    "PP": (chain(np.eye(4), TURN_X, np.eye(4), kinds="PP", limits=[(0, 100), (-20, 180)]), 20_000.0, 0.0005),
+    "PP": (chain_arm(np.eye(4), TURN_X, np.eye(4), kinds="PP", limits=[(0, 100), (-20, 180)]), 20_000.0, 0.0005),
     "PPP, tilted": (
-        chain(TILTED, TURN_X, TURN_Y, np.eye(4), kinds="PPP", limits=[(0, 100), (0, 200), (-50, 300)]),
+        chain_arm(TILTED, TURN_X, TURN_Y, np.eye(4), kinds="PPP", limits=[(0, 100), (0, 200), (-50, 300)]),
         7e6,
         0.02,
     ),
     "RPP": (
-        chain(np.eye(4), np.eye(4), TURN_Y, np.eye(4), kinds="RPP", limits=[FREE, (0, 200), (100, 300)]),
+        chain_arm(np.eye(4), np.eye(4), TURN_Y, np.eye(4), kinds="RPP", limits=[FREE, (0, 200), (100, 300)]),
         TUBE,
         0.01,
     ),
     "PRP": (
-        chain(np.eye(4), np.eye(4), TURN_Y, np.eye(4), kinds="PRP", limits=[(0, 200), FREE, (100, 300)]),
+        chain_arm(np.eye(4), np.eye(4), TURN_Y, np.eye(4), kinds="PRP", limits=[(0, 200), FREE, (100, 300)]),
         TUBE,
         0.02,
     ),
@@ -108,13 +108,13 @@ def test_volume_of_an_arm_with_a_wrist() -> None:
     links = [
         np.eye(4),
         TURN_X,
-        along(200),
-        along(300) @ TURN_Y,
+        shift_along_x(200),
+        shift_along_x(300) @ TURN_Y,
         TURN_X,
         TURN_X,
         transform((0, 80, 0), (0, 0, 0)),
     ]
-    arm = chain(*links, kinds="RRRRRR", limits=[FREE] * 6)
+    arm = chain_arm(*links, kinds="RRRRRR", limits=[FREE] * 6)
     tip = position(arm, np.random.default_rng(0).uniform(-math.pi, math.pi, (100_000, 6)))
     far = np.linalg.norm(tip, axis=1).max()
     assert 560 < far < 580  # chance alone does not get to the end
@@ -127,8 +127,8 @@ def test_volume_of_an_arm_with_a_wrist() -> None:
     ("arm", "dimensions", "why"),
     [
         (PAN_TILT, 3, "exact: the tip stays on a surface"),
-        (chain(np.eye(4), along(100), kinds="R", limits=[FREE]), 2, "exact: the tip stays on a curve"),
-        (chain(np.eye(4), np.eye(4), kinds="R", limits=[FREE]), 2, "exact: the tip does not move"),
+        (chain_arm(np.eye(4), shift_along_x(100), kinds="R", limits=[FREE]), 2, "exact: the tip stays on a curve"),
+        (chain_arm(np.eye(4), np.eye(4), kinds="R", limits=[FREE]), 2, "exact: the tip does not move"),
     ],
 )
 def test_volume_of_a_surface_is_nothing(arm: Arm, dimensions: int, why: str) -> None:
@@ -140,7 +140,7 @@ def test_volume_of_a_surface_is_nothing(arm: Arm, dimensions: int, why: str) -> 
 def test_volume_of_an_arm_that_hardly_moves_is_next_to_nothing(degrees: float) -> None:
     """Its section is narrower than floats can tell apart; no warning (they are errors here)."""
     tight = np.deg2rad([-degrees, degrees])
-    size = extent(chain(np.eye(4), TURN_X, along(200), along(300), kinds="RRR", limits=[tight] * 3))
+    size = extent(chain_arm(np.eye(4), TURN_X, shift_along_x(200), shift_along_x(300), kinds="RRR", limits=[tight] * 3))
     assert 0.0 <= size.value < 1e-6
 
 
@@ -219,7 +219,7 @@ def test_tip_manipulability() -> None:
     values = np.linalg.svd(jacobian(THREE_DOF, q)[:, :3], compute_uv=False)
     assert measure_function(THREE_DOF, "manipulability")(q) == pytest.approx(values.prod(axis=1), rel=1e-9)
     # Planar arm: a1 a2 |sin q2| (Yoshikawa 1985, eq. 26); and the same in a plane that stands askew.
-    tilted = chain(TILTED, along(200), along(300), kinds="RR", limits=[FREE, FREE])
+    tilted = chain_arm(TILTED, shift_along_x(200), shift_along_x(300), kinds="RR", limits=[FREE, FREE])
     for arm in (PLANAR, tilted):
         assert measure_function(arm, "manipulability")(q[:, :2]) == pytest.approx(
             200 * 300 * np.abs(np.sin(q[:, 1])), rel=1e-9

@@ -11,21 +11,21 @@ from pydantic import ValidationError
 
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError
-from hostile_robot_files import DH, MOTORS, SCREWS, SERVO, VALID, cases
-from quick import least
+from hostile_robot_files import DH, MOTORS, SCREWS, SERVO, VALID, hostile_files
+from quick import least_seconds
 
 ROOT = Path(__file__).parents[2]
 SNAPSHOT = Path(__file__).parents[1] / "snapshots" / "robot_file_errors.txt"
-CASES = cases()
+CASES = hostile_files()
 
 
-def message(raw: bytes | str) -> str:
+def error_message(raw: bytes | str) -> str:
     with pytest.raises(RobotFileError) as caught:
         robot_file.parse_robot_file(raw, "arm.yaml")
     return str(caught.value)
 
 
-def snapshots() -> dict[str, str]:
+def read_snapshots() -> dict[str, str]:
     blocks = SNAPSHOT.read_text().split("\n\n")
     return {name: text for name, _, text in (block.strip().partition("\n") for block in blocks)}
 
@@ -34,7 +34,7 @@ def snapshots() -> dict[str, str]:
 def _update() -> None:
     """ARMKIN_UPDATE_SNAPSHOTS=1 writes the messages anew, for review in the diff."""
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
-        blocks = [f"[{name}]\n{message(raw)}" for name, raw in CASES.items()]
+        blocks = [f"[{name}]\n{error_message(raw)}" for name, raw in CASES.items()]
         SNAPSHOT.write_text("\n\n".join(blocks) + "\n")
 
 
@@ -42,16 +42,16 @@ def _update() -> None:
 def test_hostile_file_is_refused_in_the_reviewed_words(name: str) -> None:
     robot_file.parse_robot_file(DH)  # the model is built once in a process; that is not the file's time
     texts: list[str] = []
-    seconds = least(lambda: texts.append(message(CASES[name])), 2)
+    seconds = least_seconds(lambda: texts.append(error_message(CASES[name])), 2)
     text = texts[0]
-    assert text == snapshots()[f"[{name}]"]
+    assert text == read_snapshots()[f"[{name}]"]
     assert len(text.splitlines()) <= 21, "all problems, a line each, and how many more"
     assert all(len(line) <= 240 for line in text.splitlines())
     assert seconds < 2  # 0.03 s at most on an idle machine
 
 
 def test_every_snapshot_belongs_to_a_case() -> None:
-    assert set(snapshots()) == {f"[{name}]" for name in CASES}
+    assert set(read_snapshots()) == {f"[{name}]" for name in CASES}
     assert len(CASES) >= 120
 
 
@@ -60,11 +60,11 @@ def test_the_files_that_the_cases_spoil_are_valid(name: str) -> None:
     assert robot_file.parse_robot_file(VALID[name]).name == "arm"
 
 
-def shipped() -> list[Path]:
+def all_robot_files() -> list[Path]:
     return sorted((ROOT / "robots").glob("*.yaml")) + sorted((ROOT / "tests" / "robots").glob("*.yaml"))
 
 
-@pytest.mark.parametrize("path", shipped(), ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", all_robot_files(), ids=lambda path: path.stem)
 def test_shipped_robot(path: Path) -> None:
     robot = robot_file.read_robot_file(path)
     assert robot.name == path.stem

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from armkin.robot_file import strict_yaml
 from armkin.robot_file.strict_yaml import StrictYamlError, load_yaml
-from hostile_robot_files import VALID, cases
+from hostile_robot_files import VALID, hostile_files
 
 
 @pytest.mark.parametrize(
@@ -123,7 +123,7 @@ def test_both_parsers_refuse_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
             return "not YAML" if error.problem.startswith("not YAML") else str(error)
         return "read"
 
-    small = {name: raw for name, raw in cases().items() if len(raw) < 20_000}
+    small = {name: raw for name, raw in hostile_files().items() if len(raw) < 20_000}
     fast = {name: outcome(raw) for name, raw in small.items()}
     monkeypatch.setattr(strict_yaml, "_LOADER", yaml.SafeLoader)
     assert {name: outcome(raw) for name, raw in small.items()} == fast

@@ -16,12 +16,12 @@ from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file, number_text, rpy_angles
 from command_line import ROOT, run
-from quick import least
-from urdf_chains import CHAINS, moving, pose
-from urdf_chains import text as as_urdf
+from quick import least_seconds
+from urdf_chains import CHAINS, moving_joints, tip_pose
+from urdf_chains import urdf_text as as_urdf
 
 
-def imported(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
+def import_chain(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
     imported = urdf_reader.parse_urdf(as_urdf(chain).encode(), base=chain["base"], tip=chain["tip"], **settings)
     return arm_of_file(robot_file.parse_robot_file(format_robot_file(imported.data, imported.notes)))
 
@@ -31,12 +31,12 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
     """To 1e-9 mm: against poses computed by pinocchio or yourdfpy (`expected`), and by tests/urdf_chains.py."""
     chain = CHAINS[name]
     assert chain["expected"]
-    arm = imported(chain)
-    joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
+    arm = import_chain(chain)
+    joints = [joint for joint in moving_joints(chain) if joint["type"] != "fixed"]
     cases = [(case["q_si"], np.array(case["T_m"])) for case in chain.get("expected", [])]
     slides = np.array([joint["type"] == "prismatic" for joint in joints])
     for q in np.random.default_rng(7).uniform(-3, 3, (20, len(joints))) * np.where(slides, 0.1, 1.0):
-        cases.append((q, pose(chain, {joint["name"]: value for joint, value in zip(joints, q, strict=True)})))
+        cases.append((q, tip_pose(chain, {joint["name"]: value for joint, value in zip(joints, q, strict=True)})))
     for q, T in cases:
         T_read = armkin.fk(arm, np.asarray(q) * np.where(slides, 1000.0, 1.0))
         assert np.abs(T_read[:3, 3] - 1000 * T[:3, 3]).max() < 1e-9
@@ -46,7 +46,7 @@ def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
 @pytest.mark.parametrize("name", CHAINS)
 def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
     """The same poses to 1e-9 mm, the same limits, and the same solver class."""
-    arm = imported(CHAINS[name])
+    arm = import_chain(CHAINS[name])
     again = arm_of_file(
         robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(write_urdf(arm).encode()).data))
     )
@@ -59,10 +59,10 @@ def test_a_real_chain_goes_out_to_urdf_and_comes_back(name: str) -> None:
         values, values_again = getattr(arm, bound), getattr(again, bound)
         assert np.array_equal(np.isfinite(values), np.isfinite(values_again))
         assert values_again[np.isfinite(values_again)] == pytest.approx(values[np.isfinite(values)], abs=1e-10)
-    assert solver(again) == solver(arm)
+    assert solver_class(again) == solver_class(arm)
 
 
-def solver(arm: armkin.Arm) -> str:
+def solver_class(arm: armkin.Arm) -> str:
     """What ik solves the arm as; seven joints and more have no class of their own."""
     try:
         return armkin.method(arm)[0]
@@ -73,9 +73,9 @@ def solver(arm: armkin.Arm) -> str:
 @pytest.mark.parametrize("name", CHAINS)
 def test_a_real_chain_keeps_limits_and_speeds(name: str) -> None:
     chain = CHAINS[name]
-    file = imported(chain).file
+    file = import_chain(chain).file
     assert file is not None
-    joints = [joint for joint in moving(chain) if joint["type"] != "fixed"]
+    joints = [joint for joint in moving_joints(chain) if joint["type"] != "fixed"]
     for joint, source in zip(file.joints, joints, strict=True):
         size = 1000.0 if source["type"] == "prismatic" else 180 / np.pi
         if source["type"] == "continuous":
@@ -105,7 +105,7 @@ TWO_ENDS = (
 )
 
 
-def document(*changes: tuple[str, str]) -> bytes:
+def urdf_of(*changes: tuple[str, str]) -> bytes:
     body = JOINTS
     for before, after in changes:
         assert before in body
@@ -114,42 +114,42 @@ def document(*changes: tuple[str, str]) -> bytes:
 
 
 BAD = {
-    "several ends": (document(("</joint>\n<joint name=\"elbow", TWO_ENDS.join(["</joint>", '\n<joint name="elbow']))),
+    "several ends": (urdf_of(("</joint>\n<joint name=\"elbow", TWO_ENDS.join(["</joint>", '\n<joint name="elbow']))),
                      "the tip must be named: hand, tcp, finger"),
-    "axis of no length": (document(('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>')), "axis 0 0 0 has no direction"),
-    "not a number": (document(('xyz="0 0 0.1"', 'xyz="0 0 nan"')), "origin xyz: '0 0 nan' is not 3 numbers"),
-    "two numbers": (document(('xyz="0 0 0.1"', 'xyz="0 0.1"')), "origin xyz: '0 0.1' is not 3 numbers"),
-    "infinite": (document(('lower="-2"', 'lower="-1e999"')), "limit lower: '-1e999' is not finite"),
-    "word": (document(('velocity="1.5"', 'velocity="fast"')), "limit velocity: 'fast' is not a number"),
-    "limits reversed": (document(('lower="-2" upper="2"', 'lower="2" upper="-2"')),
+    "axis of no length": (urdf_of(('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>')), "axis 0 0 0 has no direction"),
+    "not a number": (urdf_of(('xyz="0 0 0.1"', 'xyz="0 0 nan"')), "origin xyz: '0 0 nan' is not 3 numbers"),
+    "two numbers": (urdf_of(('xyz="0 0 0.1"', 'xyz="0 0.1"')), "origin xyz: '0 0.1' is not 3 numbers"),
+    "infinite": (urdf_of(('lower="-2"', 'lower="-1e999"')), "limit lower: '-1e999' is not finite"),
+    "word": (urdf_of(('velocity="1.5"', 'velocity="fast"')), "limit velocity: 'fast' is not a number"),
+    "limits reversed": (urdf_of(('lower="-2" upper="2"', 'lower="2" upper="-2"')),
                         "lower limit 114.592 deg is above upper limit -114.592 deg"),
-    "limits equal": (document(('lower="-2" upper="2"', 'lower="1" upper="1"')), "a joint that never moves is fixed"),
-    "millimetres as metres": (document(('xyz="0.3 0 0"', 'xyz="30000 0 0"')), "a URDF is in metres"),
-    "mimic on the chain": (document(("<axis", '<mimic joint="elbow" multiplier="-1"/><axis')), "mimics elbow"),
-    "floating joint": (document((f'"elbow" {ELBOW}', f'"elbow" {ELBOW.replace("revolute", "floating")}')),
+    "limits equal": (urdf_of(('lower="-2" upper="2"', 'lower="1" upper="1"')), "a joint that never moves is fixed"),
+    "millimetres as metres": (urdf_of(('xyz="0.3 0 0"', 'xyz="30000 0 0"')), "a URDF is in metres"),
+    "mimic on the chain": (urdf_of(("<axis", '<mimic joint="elbow" multiplier="-1"/><axis')), "mimics elbow"),
+    "floating joint": (urdf_of((f'"elbow" {ELBOW}', f'"elbow" {ELBOW.replace("revolute", "floating")}')),
                        "type floating; revolute, continuous, prismatic and fixed can be read"),
-    "no type": (document((ELBOW, ELBOW[15:])), "type is missing"),
-    "unknown child": (document(('<child link="lower"/>', '<child link="lowr"/>')), "there is no child link lowr"),
-    "no parent": (document(('<parent link="upper"/>', "")), "joint elbow: has no <parent link=...>"),
-    "two joints of a name": (document(('name="wrist"', 'name="elbow"')), "two joints are named elbow"),
-    "two links of a name": (document(('<link name="hand"/>', '<link name="lower"/>')), "two links are named lower"),
-    "closed linkage": (document(('<child link="hand"/>', '<child link="upper"/>')),
+    "no type": (urdf_of((ELBOW, ELBOW[15:])), "type is missing"),
+    "unknown child": (urdf_of(('<child link="lower"/>', '<child link="lowr"/>')), "there is no child link lowr"),
+    "no parent": (urdf_of(('<parent link="upper"/>', "")), "joint elbow: has no <parent link=...>"),
+    "two joints of a name": (urdf_of(('name="wrist"', 'name="elbow"')), "two joints are named elbow"),
+    "two links of a name": (urdf_of(('<link name="hand"/>', '<link name="lower"/>')), "two links are named lower"),
+    "closed linkage": (urdf_of(('<child link="hand"/>', '<child link="upper"/>')),
                        "link upper hangs on two joints, shoulder and wrist"),
-    "circle": (document(('<parent link="base"/>', '<parent link="hand"/>')), "the joints are a circle"),
-    "two roots": (document(('<parent link="upper"/>', '<parent link="stand"/>'),
+    "circle": (urdf_of(('<parent link="base"/>', '<parent link="hand"/>')), "the joints are a circle"),
+    "two roots": (urdf_of(('<parent link="upper"/>', '<parent link="stand"/>'),
                            ('<link name="hand"/>', '<link name="hand"/><link name="stand"/>')),
                   "several links have no parent: base, stand"),
     "no joints": (b'<robot name="x"><link name="a"/></robot>', "no link carries another; there is no chain"),
-    "all fixed": (document().replace(b"revolute", b"fixed"), "no joint moves between base and its ends"),
+    "all fixed": (urdf_of().replace(b"revolute", b"fixed"), "no joint moves between base and its ends"),
     "xacro": (b'<robot xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:macro name="x"/></robot>', "xacrodoc"),
-    "xacro value": (document(('xyz="0 0 0.1"', 'xyz="0 0 ${height}"')), "is a xacro, a template of a URDF"),
+    "xacro value": (urdf_of(('xyz="0 0 0.1"', 'xyz="0 0 ${height}"')), "is a xacro, a template of a URDF"),
     "sdf": (b'<sdf version="1.6"><model name="x"/></sdf>', "is not a URDF but an SDF file"),
     "mjcf": (b'<mujoco model="x"/>', "is not a URDF but a MuJoCo file"),
     "html": (b"<html></html>", "its outermost element is <html>"),
     "not xml": (b"joints: []", "is not XML"),
     "empty": (b"", "is not XML"),
-    "cut off": (document()[:300], "is not XML"),
-    "nameless": (document(('<link name="hand"/>', "<link/>")), "a <link> has no name"),
+    "cut off": (urdf_of()[:300], "is not XML"),
+    "nameless": (urdf_of(('<link name="hand"/>', "<link/>")), "a <link> has no name"),
     "entities": (b'<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>', "has a DTD or entities"),
     "external file": (b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><robot name="&x;"/>', "has a DTD"),
     "deep": (b'<robot name="x">' + b"<a>" * 200_000, "elements nested deeper than 50"),
@@ -174,14 +174,14 @@ def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
             urdf_reader.parse_urdf(raw, "arm.urdf")
         texts.append(str(caught.value))
 
-    assert least(tried, 2) < 2
+    assert least_seconds(tried, 2) < 2
     assert says in texts[0]
     assert texts[0].startswith("arm.urdf: ")
     assert texts[0].count("\n") <= 1
 
 
 def test_the_arm_that_the_traps_spoil_is_one() -> None:
-    file = robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(document()).data))
+    file = robot_file.parse_robot_file(format_robot_file(urdf_reader.parse_urdf(urdf_of()).data))
     assert [joint.name for joint in file.joints] == ["shoulder", "elbow", "wrist"]
     assert file.joints[0].limits == pytest.approx([-114.591559, 114.591559])
     assert file.joints[0].screw is not None
@@ -191,7 +191,7 @@ def test_the_arm_that_the_traps_spoil_is_one() -> None:
 
 def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
     data = urdf_reader.parse_urdf(
-        document(('<axis xyz="0 0 1"/>', ""), ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -3"/>'))
+        urdf_of(('<axis xyz="0 0 1"/>', ""), ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -3"/>'))
     ).data
     assert data["joints"][0]["screw"]["w"] == [1, 0, 0]
     assert data["joints"][1]["screw"]["w"] == pytest.approx([0, 1, 0], abs=1e-5)
@@ -199,58 +199,58 @@ def test_axis_is_x_by_default_and_need_not_be_of_length_1() -> None:
 
 def test_limits_of_zero_none_and_away_from_zero() -> None:
     changes = (('lower="-2" upper="2"', 'lower="0" upper="0"'), ('lower="-2" upper="2"', 'lower="0.5" upper="1.5"'))
-    imported = urdf_reader.parse_urdf(document(*changes))
+    imported = urdf_reader.parse_urdf(urdf_of(*changes))
     assert "limits" not in imported.data["joints"][0]
     assert imported.data["joints"][1]["home"] == pytest.approx(np.degrees(1.0))
     assert len(imported.notes) == 2
     robot_file.parse_robot_file(format_robot_file(imported.data))
-    none = urdf_reader.parse_urdf(document(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
+    none = urdf_reader.parse_urdf(urdf_of(('<limit lower="-2" upper="2" velocity="1.5" effort="-1"/>', "")))
     assert none.notes == ("joint shoulder has no <limit>: read as no limits",)
 
 
 def test_limits_lose_the_noise_of_radians() -> None:
     joint = urdf_reader.parse_urdf(
-        document(('lower="-2" upper="2"', 'lower="-6.28318530718" upper="6.28318530718"'))
+        urdf_of(('lower="-2" upper="2"', 'lower="-6.28318530718" upper="6.28318530718"'))
     ).data["joints"][0]
     assert joint["limits"] == [-360, 360]
 
 
 def test_names_that_a_robot_file_cannot_have_are_changed_and_said() -> None:
     imported = urdf_reader.parse_urdf(
-        document(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"'))
+        urdf_of(('name="shoulder"', 'name="/px100/1st joint"'), ('name="elbow"', 'name="2"'))
     )
     assert [joint["name"] for joint in imported.data["joints"]] == ["_px100_1st_joint", "_2", "wrist"]
     assert imported.notes == ("joint /px100/1st joint is named _px100_1st_joint", "joint 2 is named _2")
 
 
 def test_a_joint_and_a_link_may_share_a_name_and_transmissions_do_not_count() -> None:
-    body = document(('name="elbow"', 'name="upper"')).replace(
+    body = urdf_of(('name="elbow"', 'name="upper"')).replace(
         b"</robot>", b'<transmission name="t"><joint name="upper"/><actuator name="m"/></transmission></robot>'
     )
     assert [joint["name"] for joint in urdf_reader.parse_urdf(body).data["joints"]] == ["shoulder", "upper", "wrist"]
 
 
 def test_an_empty_line_first_and_elements_of_simulators_do_no_harm() -> None:
-    body = document(("<axis", '<dynamics damping="nan"/><safety_controller k_velocity="x"/><axis'))
+    body = urdf_of(("<axis", '<dynamics damping="nan"/><safety_controller k_velocity="x"/><axis'))
     with_more = body.replace(b"</robot>", b'<gazebo reference="upper"><mu1>x</mu1></gazebo></robot>')
     assert (
-        urdf_reader.parse_urdf(b'\n <?xml version="1.0"?>' + with_more).data == urdf_reader.parse_urdf(document()).data
+        urdf_reader.parse_urdf(b'\n <?xml version="1.0"?>' + with_more).data == urdf_reader.parse_urdf(urdf_of()).data
     )
 
 
 def test_base_and_tip_choose_a_part_of_the_chain() -> None:
-    imported = urdf_reader.parse_urdf(document(), base="upper", tip="hand")
+    imported = urdf_reader.parse_urdf(urdf_of(), base="upper", tip="hand")
     assert [joint["name"] for joint in imported.data["joints"]] == ["elbow", "wrist"]
     with pytest.raises(UsageError, match="there is no link hnd for the tip; the links are base, upper, lower, hand"):
-        urdf_reader.parse_urdf(document(), tip="hnd")
+        urdf_reader.parse_urdf(urdf_of(), tip="hnd")
     with pytest.raises(UsageError, match="tip base does not hang on base upper"):
-        urdf_reader.parse_urdf(document(), base="upper", tip="base")
+        urdf_reader.parse_urdf(urdf_of(), base="upper", tip="base")
 
 
 def test_a_mimic_joint_off_the_chain_is_ignored() -> None:
     more = TWO_ENDS.replace("<limit", '<mimic joint="wrist"/><limit')
     imported = urdf_reader.parse_urdf(
-        document(('</joint>\n<joint name="elbow', f'</joint>{more}\n<joint name="elbow')), tip="tcp"
+        urdf_of(('</joint>\n<joint name="elbow', f'</joint>{more}\n<joint name="elbow')), tip="tcp"
     )
     assert len(imported.data["joints"]) == 3
 
@@ -258,7 +258,7 @@ def test_a_mimic_joint_off_the_chain_is_ignored() -> None:
 def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     mesh = '<link name="base"><visual><geometry><mesh filename="file:///etc/passwd"/></geometry></visual></link>'
-    path.write_bytes(document(('<link name="base"/>', mesh)))
+    path.write_bytes(urdf_of(('<link name="base"/>', mesh)))
     opened: list[str] = []
     real = Path.open
 
@@ -274,7 +274,7 @@ def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_pat
 def test_without_defusedxml_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "defusedxml.common", None)
     with pytest.raises(ArmkinError, match=r"pip install defusedxml"):
-        urdf_reader.parse_urdf(document())
+        urdf_reader.parse_urdf(urdf_of())
 
 
 def test_a_file_that_is_not_there() -> None:
@@ -339,7 +339,7 @@ def test_the_command_prints_a_robot_file_and_says_what_it_read(tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("raw", "code"), [(b"<robot", 4), (b'<!DOCTYPE r [<!ENTITY a "b">]><robot/>', 4), (document(), 0)]
+    ("raw", "code"), [(b"<robot", 4), (b'<!DOCTYPE r [<!ENTITY a "b">]><robot/>', 4), (urdf_of(), 0)]
 )
 def test_exit_codes(raw: bytes, code: int, tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
@@ -355,14 +355,14 @@ def test_numbers_are_written_without_exponents_and_come_back() -> None:
 
 
 def test_angles_come_back_also_where_the_pitch_is_a_quarter_turn() -> None:
-    from urdf_chains import turn
+    from urdf_chains import rotation_about
 
     rng = np.random.default_rng(3)
     for pitch in (0.3, np.pi / 2, -np.pi / 2, np.pi / 2 - 1e-10, -np.pi / 2 + 3e-8):
         roll, yaw = rng.uniform(-3, 3, 2)
-        R = turn([0, 0, 1], yaw) @ turn([0, 1, 0], pitch) @ turn([1, 0, 0], roll)
+        R = rotation_about([0, 0, 1], yaw) @ rotation_about([0, 1, 0], pitch) @ rotation_about([1, 0, 0], roll)
         r, p, y = rpy_angles(R.tolist())
-        again = turn([0, 0, 1], y) @ turn([0, 1, 0], p) @ turn([1, 0, 0], r)
+        again = rotation_about([0, 0, 1], y) @ rotation_about([0, 1, 0], p) @ rotation_about([1, 0, 0], r)
         assert np.abs(again - R).max() < 1e-15 * 8
 
 
@@ -376,18 +376,18 @@ def test_radii_come_from_round_collision_shapes_and_no_others() -> None:
         "lower": solid('<cylinder radius="0.03" length="0.3"/>') + solid('<box size="1 1 1"/>'),
         "hand": solid('<sphere radius="0.5"/>', "visual"),
     }
-    raw = document(*((f'<link name="{name}"/>', f'<link name="{name}">{of}</link>') for name, of in links.items()))
+    raw = urdf_of(*((f'<link name="{name}"/>', f'<link name="{name}">{of}</link>') for name, of in links.items()))
     data = urdf_reader.parse_urdf(raw).data
     assert data["base"] == {"body": {"radius": 60.0}}
     assert [joint.get("body") for joint in data["joints"]] == [{"radius": 50.0}, None, None]
     assert robot_file.parse_robot_file(format_robot_file(data)).joints[0].body is not None
     fixed = '<link name="tcp"><collision><geometry><cylinder radius="0.02"/></geometry></collision></link>'
     joint = '<joint name="to_tcp" type="fixed"><parent link="hand"/><child link="tcp"/></joint>'
-    assert urdf_reader.parse_urdf(document(('<link name="hand"/>', f'<link name="hand"/>{fixed}{joint}'))).data[
+    assert urdf_reader.parse_urdf(urdf_of(('<link name="hand"/>', f'<link name="hand"/>{fixed}{joint}'))).data[
         "joints"
     ][2]["body"] == {"radius": 20.0}
     for odd in ("-1", "nan", "", "1e9", "x"):
-        raw = document(('<link name="upper"/>', f'<link name="upper">{solid(f"""<sphere radius="{odd}"/>""")}</link>'))
+        raw = urdf_of(('<link name="upper"/>', f'<link name="upper">{solid(f"""<sphere radius="{odd}"/>""")}</link>'))
         assert "body" not in urdf_reader.parse_urdf(raw).data["joints"][0]
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import armkin
 from command_line import run, run_process
-from quick import least
+from quick import least_seconds
 
 WORDS = [
     *("", "a: b # \"x\" 'y'", "a\u0085b", "a\u2028b", "a\tb", "\u00e4\u20ac\U0001f600", "x" * 5000, "{a: b}", "[1]"),
@@ -27,7 +27,7 @@ LIMITS = [
 ]
 
 
-def urdf(
+def hostile_urdf(
     names: tuple[str, ...] = ("a", "b", "c"),
     links: str = "l",
     kind: str = "revolute",
@@ -48,21 +48,25 @@ def urdf(
 
 
 CASES: dict[str, str | bytes] = {
-    **{f"links {word[:9]!a}": urdf(links=word) for word in WORDS},
-    **{f"names {word[:9]!a}": urdf(names=(f"{word}1", f"{word}2", "q")) for word in WORDS},
-    **{f"kind {word[:9]!a}": urdf(kind=word) for word in WORDS},
-    **{f"mimic {word[:9]!a}": urdf(extra=f"<mimic joint={quoteattr(word)}/>") for word in WORDS},
-    **{f"xyz {value[:9]!a}": urdf(xyz=value) for value in [*VALUES, *WORDS[:4]]},
-    **{f"rpy {value[:9]!a}": urdf(rpy=value) for value in [*VALUES, *WORDS[:4]]},
-    **{f"axis {value[:9]!a}": urdf(axis=value) for value in [*VALUES, *WORDS[:4]]},
-    **{f"{kind} {limit}": urdf(limit=limit, kind=kind) for kind in ("revolute", "prismatic") for limit in LIMITS},
-    "utf-16": urdf().encode("utf-16"),
-    "unknown encoding": b'<?xml version="1.0" encoding="foo"?>' + urdf().encode(),
-    "a zero byte": urdf().encode().replace(b"l1", b"l\x001"),
+    **{f"links {word[:9]!a}": hostile_urdf(links=word) for word in WORDS},
+    **{f"names {word[:9]!a}": hostile_urdf(names=(f"{word}1", f"{word}2", "q")) for word in WORDS},
+    **{f"kind {word[:9]!a}": hostile_urdf(kind=word) for word in WORDS},
+    **{f"mimic {word[:9]!a}": hostile_urdf(extra=f"<mimic joint={quoteattr(word)}/>") for word in WORDS},
+    **{f"xyz {value[:9]!a}": hostile_urdf(xyz=value) for value in [*VALUES, *WORDS[:4]]},
+    **{f"rpy {value[:9]!a}": hostile_urdf(rpy=value) for value in [*VALUES, *WORDS[:4]]},
+    **{f"axis {value[:9]!a}": hostile_urdf(axis=value) for value in [*VALUES, *WORDS[:4]]},
+    **{
+        f"{kind} {limit}": hostile_urdf(limit=limit, kind=kind)
+        for kind in ("revolute", "prismatic")
+        for limit in LIMITS
+    },
+    "utf-16": hostile_urdf().encode("utf-16"),
+    "unknown encoding": b'<?xml version="1.0" encoding="foo"?>' + hostile_urdf().encode(),
+    "a zero byte": hostile_urdf().encode().replace(b"l1", b"l\x001"),
     "noise": np.random.default_rng(1).bytes(1000),
-    "cut off": urdf()[:300],
-    "twice": urdf() + urdf(),
-    "another file": '<!DOCTYPE r SYSTEM "file:///etc/passwd">' + urdf(),
+    "cut off": hostile_urdf()[:300],
+    "twice": hostile_urdf() + hostile_urdf(),
+    "another file": '<!DOCTYPE r SYSTEM "file:///etc/passwd">' + hostile_urdf(),
     "nested": "<robot name='r'>" + "<a>" * 100_000,
     "large": "<robot name='r'>" + "<link name='x'/>" * 600_000,
     "100000 attributes": "<robot " + " ".join(f"a{k}='1'" for k in range(100_000)) + "/>",
@@ -76,7 +80,7 @@ def test_it_ends_in_words_or_in_a_robot_file(name: str, tmp_path: Path) -> None:
     path, made = tmp_path / "x.urdf", tmp_path / "x.yaml"
     path.write_bytes(raw if isinstance(raw, bytes) else raw.encode("utf-8", "surrogatepass"))
     results = []
-    assert least(lambda: results.append(run("import", path)), 2.0) < 2.0
+    assert least_seconds(lambda: results.append(run("import", path)), 2.0) < 2.0
     completed = results[0]
     assert "internal error" not in completed.err
     assert not re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u202e]", completed.err)
@@ -92,13 +96,13 @@ def test_it_ends_in_words_or_in_a_robot_file(name: str, tmp_path: Path) -> None:
 
 def test_what_looks_like_another_unit_is_asked_for(tmp_path: Path) -> None:
     path = tmp_path / "x.urdf"
-    path.write_text(urdf(xyz="0 0 250", limit='lower="-180" upper="180"'))
+    path.write_text(hostile_urdf(xyz="0 0 250", limit='lower="-180" upper="180"'))
     completed = run("import", path)
     assert completed.code == 0
     assert "l3 is 750 m from l0: a URDF is in metres, are these millimetres?" in completed.err
     assert "joint a turns -10313.2" in completed.err
     assert "a URDF is in radians, are these degrees?" in completed.err
-    path.write_text(urdf(limit='lower="-1e16" upper="1e16"'))
+    path.write_text(hostile_urdf(limit='lower="-1e16" upper="1e16"'))
     endless = run("import", path)
     assert "joint a has limits beyond 1000000 deg: read as no limits" in endless.err
     assert "limits:" not in endless.out.replace("has limits", "")
@@ -106,7 +110,7 @@ def test_what_looks_like_another_unit_is_asked_for(tmp_path: Path) -> None:
 
 def test_a_pipe_is_read_once(tmp_path: Path) -> None:
     """`armkin import <(xacro arm.xacro)` and `xacro arm.xacro | armkin import -`."""
-    rough = urdf(rpy="1.570796 0 0")
+    rough = hostile_urdf(rpy="1.570796 0 0")
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)
     writer = threading.Thread(target=lambda: fifo.write_text(rough))

@@ -48,12 +48,12 @@ NO_PIXELS = "--disable-gl-drawing-for-tests"
 @contextmanager
 def chromium(*options: str) -> Iterator[Browser]:
     """The browser; there is no other in this process meanwhile, unless it is `launched`."""
-    with sync_playwright() as playwright, launched(playwright.chromium, *options) as browser:
+    with sync_playwright() as playwright, launch_browser(playwright.chromium, *options) as browser:
         yield browser
 
 
 @contextmanager
-def launched(kind: BrowserType, *options: str) -> Iterator[Browser]:
+def launch_browser(kind: BrowserType, *options: str) -> Iterator[Browser]:
     """A browser of its own, with a new profile; kind: `browser_type` of one that runs."""
     path = shutil.which("chromium") or shutil.which("chromium-browser")
     assert path, "no chromium: scripts/test installs it; or leave these tests out: -m 'not browser'"
@@ -63,7 +63,7 @@ def launched(kind: BrowserType, *options: str) -> Iterator[Browser]:
 
 
 @contextmanager
-def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]:
+def open_page(browser: Browser, address: str, **settings: object) -> Iterator[Page]:
     """A page, open and drawn; script: runs before the page's own; quiet: it complains of nothing. It must
     not ask another machine for anything."""
     viewport = settings.pop("viewport", {"width": 860, "height": 640})
@@ -87,25 +87,25 @@ def opened(browser: Browser, address: str, **settings: object) -> Iterator[Page]
     assert [url for url in requested if not url.startswith((base, "data:", "blob:"))] == []
 
 
-def value(page: Page, selector: str) -> float:
+def box_value(page: Page, selector: str) -> float:
     """Number in a box."""
     return float(page.input_value(selector))
 
 
-def values(page: Page, selector: str) -> list[float]:
+def box_values(page: Page, selector: str) -> list[float]:
     """Numbers in boxes."""
     return [float(box.input_value()) for box in page.locator(selector).all()]
 
 
-def aim(page: Page, *target: float) -> None:
+def type_target(page: Page, *target: float) -> None:
     """Type the tip's target."""
     for box, number in zip(page.locator("#target input").all(), target, strict=True):
         box.fill(str(number))
     page.keyboard.press("Tab")
-    settled(page)
+    wait_for_answers(page)
 
 
-def until(page: Page, condition: str, argument: object = None, seconds: float = 120.0) -> None:
+def wait_until(page: Page, condition: str, argument: object = None, seconds: float = 120.0) -> None:
     """Until an expression holds. (Playwright's own waiting evaluates text in the page, which its policy forbids.)"""
     end = time.monotonic() + seconds
     while not page.evaluate(f"argument => {condition}", argument):
@@ -117,7 +117,7 @@ def until(page: Page, condition: str, argument: object = None, seconds: float = 
         page.wait_for_timeout(20)
 
 
-def jogged(
+def hold_jog(
     page: Page, press: Callable[[], None], release: Callable[[], None], has_arrived: Callable[[], object]
 ) -> None:
     """A jog's button is held until the board is there, and stays held. On a busy computer the page's signs of life come
@@ -127,7 +127,7 @@ def jogged(
     press()
     while not has_arrived():
         assert time.monotonic() < end, page.inner_text("#standing") + page.inner_text("#trouble")
-        unheard = time.monotonic() > pressed + 10 and not standing(page).startswith("jog")
+        unheard = time.monotonic() > pressed + 10 and not standing_text(page).startswith("jog")
         if unheard or "press again" in page.inner_text("#arrived"):
             release()
             pressed = time.monotonic()
@@ -135,21 +135,21 @@ def jogged(
         page.wait_for_timeout(20)
 
 
-def standing(page: Page) -> str:
+def standing_text(page: Page) -> str:
     """What the board does and whether its position is known, as the page says it."""
     return page.inner_text("#standing")
 
 
-def repainted(page: Page) -> None:
+def wait_for_repaint(page: Page) -> None:
     """Until what was asked to be drawn by now has been drawn."""
     page.evaluate("() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
 
-def settled(page: Page) -> None:
+def wait_for_answers(page: Page) -> None:
     """Until the page's answers have come: nothing is asked any more."""
-    until(page, "document.documentElement.dataset.asking === 'no'")
+    wait_until(page, "document.documentElement.dataset.asking === 'no'")
 
 
-def idle(page: Page, after: str) -> None:
+def wait_for_board(page: Page, after: str) -> None:
     """Until the board has ended what it was told."""
-    until(page, "document.querySelector('#arrived').textContent.includes(argument)", after)
+    wait_until(page, "document.querySelector('#arrived').textContent.includes(argument)", after)

@@ -10,10 +10,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from browsing import NO_PIXELS, chromium, launched, opened
+from browsing import NO_PIXELS, chromium, launch_browser, open_page
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
-from served import Page, served
+from served import Page, serve_robot
 
 sys.path.append(str(Path(__file__).parents[1] / "firmware"))
 
@@ -44,7 +44,7 @@ def browser() -> Browser:
 @pytest.fixture
 def drawing_browser(browser: Browser) -> Iterator[Browser]:
     """For tests that look at the picture."""
-    with launched(browser.browser_type) as fresh_browser:
+    with launch_browser(browser.browser_type) as fresh_browser:
         yield fresh_browser
 
 
@@ -62,14 +62,14 @@ def pytest_runtest_teardown(nextitem: pytest.Item | None) -> Iterator[None]:
 @pytest.fixture(scope="module")
 def tab(browser: Browser) -> Iterator[Tab]:
     """A page of three_dof without a board, for the tests of a file that begin at a target or a program of their own."""
-    with served() as server, opened(browser, server.address) as page:
+    with serve_robot() as server, open_page(browser, server.address) as page:
         yield page
 
 
 @pytest.fixture
 def sim() -> Iterator[Page]:
     """A page in control of a simulated board at rest."""
-    with served(board="sim") as server:
+    with serve_robot(board="sim") as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         page.idle()

@@ -25,7 +25,7 @@ MOVES = "note: Ctrl-C ends it, after the arm has been stopped\n"
 
 
 @contextmanager
-def serving(actions: Actions) -> Iterator[Server]:
+def serve_actions(actions: Actions) -> Iterator[Server]:
     """A server of these actions, in a thread of its own."""
     server = Server(actions)
     thread = threading.Thread(target=lambda: server.serve_forever(poll_interval=0.05))
@@ -40,15 +40,15 @@ def serving(actions: Actions) -> Iterator[Server]:
 
 
 @contextmanager
-def served(robot: str | Path = "three_dof", board: str | None = None) -> Iterator[Server]:
+def serve_robot(robot: str | Path = "three_dof", board: str | None = None) -> Iterator[Server]:
     """The server of a robot of the project, or of a file; board: a port."""
     path = robot if isinstance(robot, Path) else ROOT / f"robots/{robot}.yaml"
-    with serving(Actions(armkin.load(str(path)), board)) as server:
+    with serve_actions(Actions(armkin.load(str(path)), board)) as server:
         yield server
 
 
 @contextmanager
-def teaching(*words: str) -> Iterator[str]:
+def run_teach(*words: str) -> Iterator[str]:
     """`armkin teach` as a process of its own, as people start it; its address."""
     command = [sys.executable, "-m", "armkin", "teach", *words, "--no-open"]
     process = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
@@ -61,7 +61,7 @@ def teaching(*words: str) -> Iterator[str]:
         assert process.returncode == 143
 
 
-def port(server: Server) -> int:
+def port_number(server: Server) -> int:
     return int(server.server_address[1])
 
 
@@ -69,7 +69,7 @@ def ask(
     server: Server, method: str, path: str, body: bytes | None = None, headers: dict[str, str] | None = None
 ) -> tuple[int, dict[str, str], bytes]:
     """One request; status, headers, body."""
-    connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=60)
+    connection = http.client.HTTPConnection("127.0.0.1", port_number(server), timeout=60)
     try:
         connection.request(method, path, body, headers or {})
         answer = connection.getresponse()
@@ -78,23 +78,23 @@ def ask(
         connection.close()
 
 
-def good(server: Server, tab: str = "") -> dict[str, str]:
+def good_headers(server: Server, tab: str = "") -> dict[str, str]:
     """Headers as the page sends them."""
     return {
-        "Origin": f"http://127.0.0.1:{port(server)}",
+        "Origin": f"http://127.0.0.1:{port_number(server)}",
         "Content-Type": "application/json",
         "X-Armkin-Key": server.guard.key,
         "X-Armkin-Tab": tab,
     }
 
 
-def act(server: Server, name: str, fields: dict[str, Any] | None = None, tab: str = "") -> tuple[int, Any]:
+def carry_out_action(server: Server, name: str, fields: dict[str, Any] | None = None, tab: str = "") -> tuple[int, Any]:
     """An action as the page carries it out: status and answer."""
-    status, _, data = ask(server, "POST", f"/api/{name}", json.dumps(fields or {}).encode(), good(server, tab))
+    status, _, data = ask(server, "POST", f"/api/{name}", json.dumps(fields or {}).encode(), good_headers(server, tab))
     return status, json.loads(data)
 
 
-def _heard(events: http.client.HTTPResponse, topic: str, until: Callable[[Any], bool]) -> Any:
+def _hear_news(events: http.client.HTTPResponse, topic: str, until: Callable[[Any], bool]) -> Any:
     """The next news of a topic in a stream of events that is as it shall be; AssertionError after a minute."""
     current, end = "", time.monotonic() + 60
     while time.monotonic() < end:
@@ -115,19 +115,19 @@ class Page:
         self.server = server
         self.presses = 0  # of a jog's button
         for _ in range(600):  # pages that have just been closed are open still, for a moment
-            status, self.opened = act(server, "open")
+            status, self.opened = carry_out_action(server, "open")
             if status != 429:
                 break
             time.sleep(0.1)
         assert status == 200, self.opened
         self.id = self.opened["tab"]
-        self._connection = http.client.HTTPConnection("127.0.0.1", port(server), timeout=60)
+        self._connection = http.client.HTTPConnection("127.0.0.1", port_number(server), timeout=60)
         self._connection.request("GET", f"/events?tab={self.id}")
         self._events = self._connection.getresponse()
         assert self._events.status == 200
 
     def act(self, action: str, /, **fields: Any) -> tuple[int, Any]:
-        return act(self.server, action, fields, self.id)
+        return carry_out_action(self.server, action, fields, self.id)
 
     def press(self, **jog: Any) -> tuple[int, Any]:
         """A jog's button is pressed; unless it is held, the jog ends after 0.3 s."""
@@ -154,7 +154,7 @@ class Page:
 
     def hear(self, topic: str, until: Callable[[Any], bool] = lambda data: True) -> Any:
         """The next news of a topic that is as it shall be."""
-        return _heard(self._events, topic, until)
+        return _hear_news(self._events, topic, until)
 
     def idle(self) -> Any:
         """The board's state once it has nothing to do."""
@@ -202,7 +202,7 @@ class Elsewhere:
 
     def hear(self, until: Callable[[Any], bool]) -> Any:
         """The next news of the board that is as it shall be."""
-        return _heard(self.events, "board", until)
+        return _hear_news(self.events, "board", until)
 
     def act(self, name: str, **fields: Any) -> Any:
         headers = {"Origin": self.base, "Content-Type": "application/json", "X-Armkin-Key": self.key}

@@ -41,23 +41,23 @@ DAE = """<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COL
 <instance_geometry url="#g"/></node></visual_scene></library_visual_scenes></COLLADA>"""
 
 
-def binary(corners: np.ndarray) -> bytes:
+def binary_stl(corners: np.ndarray) -> bytes:
     rows = b"".join(struct.pack("<12fH", 0, 0, 0, *triangle.ravel(), 0) for triangle in corners)
     return b"\0" * 80 + struct.pack("<I", len(corners)) + rows
 
 
-def plain(corners: np.ndarray) -> str:
+def text_stl(corners: np.ndarray) -> str:
     loops = ["".join(f"vertex {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in triangle) for triangle in corners]
     facets = "".join(f"facet normal 0 0 0\nouter loop\n{loop}endloop\nendfacet\n" for loop in loops)
     return f"solid one\n{facets}endsolid"
 
 
-def written(folder: Path, mesh: str = "package://arm/meshes/link.stl") -> Path:
+def write_urdf(folder: Path, mesh: str = "package://arm/meshes/link.stl") -> Path:
     """A URDF of three joints, each link with a mesh, in a package."""
     place = folder / "arm" / "meshes"
     place.mkdir(parents=True)
-    (place / "link.stl").write_bytes(binary(CORNERS))
-    (place / "plain.STL").write_text(plain(CORNERS))
+    (place / "link.stl").write_bytes(binary_stl(CORNERS))
+    (place / "plain.STL").write_text(text_stl(CORNERS))
     (place / "link.dae").write_text(DAE)
     names = ["base", "l1", "l2", "hand", "l3", "finger"]
     links = [LINK.format(name=name, mesh=mesh, xyz=f"0.0{k} 0 0") for k, name in enumerate(names)]
@@ -76,22 +76,22 @@ def written(folder: Path, mesh: str = "package://arm/meshes/link.stl") -> Path:
     return file
 
 
-def loaded(file: Path, base: list[float] | None = None) -> Any:
+def load_urdf(file: Path, base: list[float] | None = None) -> Any:
     document = urdf_reader.read_urdf(file, tip="l3").data
     if base is not None:
         document = {"base": {"xyz": base, "rpy": [0, 0, 30]}} | document
     return arm_of_file(robot_file.parse_robot_file(format_robot_file(document), "arm.yaml"))
 
 
-def corners(drawn: dict[str, Any], body: int) -> np.ndarray:
+def drawn_corners(drawn: dict[str, Any], body: int) -> np.ndarray:
     counts = np.frombuffer(base64.b64decode(drawn["bodies"][body]), "<i2").reshape(-1, 3, 3)
     return np.asarray(counts * drawn["unit"])
 
 
 @pytest.mark.parametrize("base", [None, [100.0, -50.0, 20.0]])
 def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] | None) -> None:
-    file = written(tmp_path)
-    arm = loaded(file, base)
+    file = write_urdf(tmp_path)
+    arm = load_urdf(file, base)
     drawn = meshes_json(arm, str(file))
     poses = {"base": np.eye(4)}
     _, robot = parse_document(file.read_bytes(), "arm")
@@ -101,16 +101,16 @@ def test_a_mesh_stands_where_the_urdf_has_it(tmp_path: Path, base: list[float] |
         assert robot.parent[name].name == joint
     frames = [np.eye(4), arm.link[0], arm.link[0] @ arm.link[1], arm.link[0] @ arm.link[1] @ arm.link[2]]
     for body, (name, shift) in enumerate({"base": 0.0, "l1": 0.01, "l2": 0.02, "l3": 0.04}.items()):
-        placed = corners(drawn, body) @ frames[body][:3, :3].T + frames[body][:3, 3]
+        placed = drawn_corners(drawn, body) @ frames[body][:3, :3].T + frames[body][:3, 3]
         expected = (CORNERS + np.array([shift, 0, 0])) @ poses[name][:3, :3].T + poses[name][:3, 3]
         expected = expected * 1000 @ arm.base[:3, :3].T + arm.base[:3, 3]
         for triangle in expected:
             assert np.abs(placed - triangle).max(axis=(1, 2)).min() < 2 * drawn["unit"]
-    assert [len(corners(drawn, body)) for body in range(4)] == [2, 2, 2, 6]  # with the hand and its finger
+    assert [len(drawn_corners(drawn, body)) for body in range(4)] == [2, 2, 2, 6]  # with the hand and its finger
 
 
 def test_three_kinds_of_files_hold_the_same_triangles(tmp_path: Path) -> None:
-    written(tmp_path)
+    write_urdf(tmp_path)
     folder = tmp_path / "arm" / "meshes"
     assert np.abs(read_triangles(folder / "link.stl") - CORNERS).max() < 1e-7
     assert np.abs(read_triangles(folder / "plain.STL") - CORNERS).max() < 1e-7
@@ -119,13 +119,13 @@ def test_three_kinds_of_files_hold_the_same_triangles(tmp_path: Path) -> None:
 
 
 def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
-    file = written(tmp_path)
+    file = write_urdf(tmp_path)
     rng = np.random.default_rng(1)
     triangles = rng.uniform(-0.2, 0.2, (20_000, 1, 3)) + rng.uniform(-0.005, 0.005, (20_000, 3, 3))
-    (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary(triangles))
-    arm = loaded(file)
+    (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary_stl(triangles))
+    arm = load_urdf(file)
     drawn = meshes_json(arm, str(file))
-    assert 0.2 * MOST < sum(len(corners(drawn, k)) for k in range(4)) <= MOST
+    assert 0.2 * MOST < sum(len(drawn_corners(drawn, k)) for k in range(4)) <= MOST
     assert len(arm_html(arm, meshes=drawn)) < 1.5e6
 
 
@@ -137,9 +137,9 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
         ("package://none/a.stl", None, "is not found"),
         ("../meshes/none.stl", None, "cannot read the mesh"),
         ("../meshes/link.stl", b"\0" * 200, "is no mesh"),
-        ("../meshes/link.stl", binary(CORNERS)[:-7], "is no mesh"),
-        ("../meshes/link.stl", binary(np.full((1, 3, 3), np.nan)), "not finite"),
-        ("../meshes/link.stl", binary(CORNERS * 1e6), "are its units metres"),
+        ("../meshes/link.stl", binary_stl(CORNERS)[:-7], "is no mesh"),
+        ("../meshes/link.stl", binary_stl(np.full((1, 3, 3), np.nan)), "not finite"),
+        ("../meshes/link.stl", binary_stl(CORNERS * 1e6), "are its units metres"),
         ("../meshes/link.dae", b"<COLLADA><asset></COLLADA>", "is no mesh"),
         ("../meshes/link.dae", b"<!DOCTYPE a [<!ENTITY b 'c'>]><COLLADA/>", "is no mesh"),
         ("../meshes/link.dae", DAE.replace("0 2 3</p>", "0 2 9</p>").encode(), "not there"),
@@ -147,8 +147,8 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
     ],
 )
 def test_what_is_no_mesh_is_refused(tmp_path: Path, mesh: str, raw: bytes | None, message: str) -> None:
-    file = written(tmp_path, mesh)
-    arm = loaded(file)
+    file = write_urdf(tmp_path, mesh)
+    arm = load_urdf(file)
     if raw is not None:
         (tmp_path / "arm" / "urdf" / mesh).resolve().write_bytes(raw)
     with pytest.raises(UsageError, match=message):
@@ -156,7 +156,7 @@ def test_what_is_no_mesh_is_refused(tmp_path: Path, mesh: str, raw: bytes | None
 
 
 def test_the_urdf_of_another_arm_is_refused(tmp_path: Path) -> None:
-    file = written(tmp_path)
+    file = write_urdf(tmp_path)
     with pytest.raises(UsageError, match="at joint values 0 the axis of its joint q2 is not that of q2"):
         meshes_json(armkin.load("three_dof"), str(file))
     completed = run("export", "three_dof", "--js", "--meshes", file)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import opened, repainted, settled, until, values
+from browsing import box_values, open_page, wait_for_answers, wait_for_repaint, wait_until
 from playwright.sync_api import Browser, Page, expect
 
 import armkin
@@ -28,19 +28,19 @@ POSTURE = "#q=20,-70,80,10,20,30"
 @pytest.fixture(scope="module")
 def ur5e(browser: Browser, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:
     """A page of a UR5e, opened at the posture that stands in its address."""
-    with opened(browser, written(tmp_path_factory.mktemp("page"), "ur5e") + POSTURE) as page:
-        assert values(page, "#sliders input[type=number]") == [20, -70, 80, 10, 20, 30]
+    with open_page(browser, write_page(tmp_path_factory.mktemp("page"), "ur5e") + POSTURE) as page:
+        assert box_values(page, "#sliders input[type=number]") == [20, -70, 80, 10, 20, 30]
         yield page
 
 
 @pytest.fixture
 def drawn(drawing_browser: Browser, tmp_path: Path) -> Iterator[Page]:
     """The same, with its picture."""
-    with opened(drawing_browser, written(tmp_path, "ur5e") + POSTURE) as page:
+    with open_page(drawing_browser, write_page(tmp_path, "ur5e") + POSTURE) as page:
         yield page
 
 
-def written(folder: Path, name: str, plan: Any = None) -> str:
+def write_page(folder: Path, name: str, plan: Any = None) -> str:
     """The address of an arm's file."""
     file = folder / "arm.html"
     file.write_text(arm_html(armkin.load(name), plan=plan), encoding="utf-8")
@@ -51,7 +51,7 @@ def at_posture(page: Page) -> Page:
     """The page at its first posture again."""
     page.evaluate("text => { location.hash = text; }", POSTURE)
     expect(page.locator("#box-1")).to_have_value("-70.0000")
-    settled(page)
+    wait_for_answers(page)
     return page
 
 
@@ -72,7 +72,7 @@ def test_the_branches_are_those_of_python(ur5e: Page) -> None:
     slider = page.locator("#sliders input[type=range]").nth(1)
     slider.focus()
     slider.press("ArrowRight")
-    settled(page)
+    wait_for_answers(page)
     shown = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
     assert shown[1] > -70.0
     s = armkin.ik(arm, armkin.fk(arm, np.deg2rad(shown)))
@@ -83,7 +83,7 @@ def test_the_branches_are_those_of_python(ur5e: Page) -> None:
     answer = page.evaluate("T => window.armkin.ik(T)", armkin.fk(arm, np.deg2rad(shown)).tolist())
     assert len(answer["branches"]) == int(s.valid.sum())
     radios.nth(3).click()
-    settled(page)
+    wait_for_answers(page)
     chosen = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
     assert np.abs(armkin.fk(arm, np.deg2rad(chosen)) - armkin.fk(arm, np.deg2rad(shown))).max() < 1e-2
     for absent in ("#send", "#board", "#record", "#save", "#stop", "#follow", "#take"):
@@ -99,7 +99,7 @@ def test_the_branches_are_those_of_python(ur5e: Page) -> None:
       return seen.size;
     }"""
     assert page.evaluate(at_once) > 200  # numbers follow before a picture is drawn
-    until(page, "location.hash.includes(',49.')")  # and the address, not too often for the browser
+    wait_until(page, "location.hash.includes(',49.')")  # and the address, not too often for the browser
     page.evaluate("location.hash = '#q=0,-90,90,0,90,0'")
     expect(page.locator("#box-1")).to_have_value("-90.0000")
 
@@ -109,7 +109,7 @@ def test_the_reach_is_shown_and_branches_are_pointed_at_by_keyboard(drawn: Page)
     before = page.locator("#canvas").screenshot()
     page.get_by_role("button", name="Reach").press("Enter")
     expect(page.locator("#legend")).to_contain_text("8000 poses")
-    repainted(page)
+    wait_for_repaint(page)
     assert page.locator("#canvas").screenshot() != before
     tips = page.evaluate(
         "import('armkin/js/workspace_cloud.js')"
@@ -154,7 +154,7 @@ def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser, tm
         arm = armkin.load(name)
         ends = {"moves": [{"joint": arm.home.tolist()}, {"joint": (arm.home + 0.1).tolist()}]}
         plan = path(arm, path_file.validate_path(ends)) if name == "three_dof" else None
-        with opened(browser, written(tmp_path, name, plan), color_scheme=colours) as page:
+        with open_page(browser, write_page(tmp_path, name, plan), color_scheme=colours) as page:
             page.get_by_role("button", name="Copy as Python").click()
             violations = Axe().run(page).response["violations"]
             bad = [
@@ -191,7 +191,7 @@ def test_hostile_words_are_shown_and_run_nothing(browser: Browser, tmp_path: Pat
             object.__setattr__(arm, field, value)  # what no robot file may say
         file = tmp_path / "arm.html"
         file.write_text(arm_html(arm), encoding="utf-8")
-        with opened(browser, file.as_uri()) as page:
+        with open_page(browser, file.as_uri()) as page:
             assert page.locator("#robot").inner_text() == eight[6]
             for fragment in (
                 *words,
@@ -213,17 +213,17 @@ def test_a_fragment_that_is_no_posture_is_home(browser: Browser, tmp_path: Path)
     home, named_posture = ["0.0000", "90.0000", "-90.0000"], ["10.0000", "60.0000", "-60.0000"]
     numbers = "[...document.querySelectorAll('#sliders input[type=number]')].map((box) => box.value)"
     bad = ("#q=<img src=x onerror=bad=1>", "#q=1,2", "#q=1e999,0,0", "#q=,,", "#%00")
-    with opened(browser, written(tmp_path, "three_dof") + bad[0]) as page:
+    with open_page(browser, write_page(tmp_path, "three_dof") + bad[0]) as page:
         assert page.evaluate(numbers) == home
-        until(page, "location.hash === '#q=0,90,-90'")
+        wait_until(page, "location.hash === '#q=0,90,-90'")
         for fragment in bad:
             for named, shown in (("#q=10,60,-60", named_posture), (fragment, home)):
                 page.evaluate("text => { location.hash = text; }", named)
-                until(page, f"{numbers}.join() === argument", ",".join(shown))
-            until(page, "location.hash === '#q=0,90,-90'")  # the address says so, too, 0.1 s later at most
+                wait_until(page, f"{numbers}.join() === argument", ",".join(shown))
+            wait_until(page, "location.hash === '#q=0,90,-90'")  # the address says so, too, 0.1 s later at most
         # the page writes what it showed before into the address, just before it hears of another one
         page.evaluate("location.hash = '#q=10,60,-60'; history.replaceState(null, '', '#q=0,90,-90');")
-        until(page, f"{numbers}.join() === argument", ",".join(named_posture), seconds=10.0)
+        wait_until(page, f"{numbers}.join() === argument", ",".join(named_posture), seconds=10.0)
         assert page.evaluate("window.bad") is None
         assert page.locator("img:not(#printed)").count() == 0
 
@@ -232,7 +232,7 @@ def test_a_path_is_played(browser: Browser, tmp_path: Path) -> None:
     arm = armkin.load("three_dof")
     file = path_file.validate_path({"moves": [{"joint": [0, 90, -90]}, {"line": [258, 110, 367]}, {"wait": 0.2}]})
     plan = path(arm, file)
-    with opened(browser, written(tmp_path, "three_dof", plan)) as page:
+    with open_page(browser, write_page(tmp_path, "three_dof", plan)) as page:
         page.locator("#when").evaluate("(bar) => { bar.value = bar.max; bar.dispatchEvent(new Event('input')); }")
         ends = np.rad2deg(plan.q(plan.duration))
         shown = [float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()]
@@ -245,7 +245,7 @@ def test_a_path_is_played(browser: Browser, tmp_path: Path) -> None:
 def test_the_redundant_joint_turns_within_its_interval_while_the_tip_stays(browser: Browser, tmp_path: Path) -> None:
     arm = armkin.load("panda")
     start = np.deg2rad([20, -30, 10, -110, 20, 90, 40])
-    with opened(browser, written(tmp_path, "panda") + "#q=20,-30,10,-110,20,90,40") as page:
+    with open_page(browser, write_page(tmp_path, "panda") + "#q=20,-30,10,-110,20,90,40") as page:
         slider = page.get_by_role("slider", name="J7, the tip stays")
         expect(page.locator("#held-range")).to_contain_text("within limits")
         low, high = map(float, re.findall(r"-?[\d.]+", page.inner_text("#held-range")))
@@ -254,7 +254,7 @@ def test_the_redundant_joint_turns_within_its_interval_while_the_tip_stays(brows
         assert [low, high] == pytest.approx(np.rad2deg(s.interval[s.best]), abs=0.01)
         for value, turned in ((0.5 * (low + high), 0.5 * (low + high)), (low - 30, low), (high + 20, high)):
             slider.evaluate("(bar, v) => { bar.value = v; bar.dispatchEvent(new Event('input')); }", value)
-            settled(page)
+            wait_for_answers(page)
             q = np.deg2rad([float(box.input_value()) for box in page.locator("#sliders input[type=number]").all()])
             assert np.rad2deg(q[6]) == pytest.approx(turned, abs=0.02)
             assert np.abs(armkin.fk(arm, q) - armkin.fk(arm, start)).max() < 5e-3

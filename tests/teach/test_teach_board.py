@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from served import Page, served
+from served import Page, serve_robot
 
 import armkin
 from armkin.model import units
@@ -61,7 +61,7 @@ def test_one_job_at_a_time_and_stop_passes_it(sim: Page) -> None:
 def test_a_robot_file_that_has_changed_moves_nothing(tmp_path: Path) -> None:
     path = tmp_path / "arm.yaml"
     shutil.copy(ROOT / "robots/three_dof.yaml", path)
-    with served(path, "sim") as server:
+    with serve_robot(path, "sim") as server:
         page = Page(server)
         page.idle()
         path.write_text(path.read_text().replace("a: 258", "a: 200"))
@@ -183,7 +183,7 @@ def test_homing_without_switches_is_refused(sim: Page) -> None:
 
 
 def test_a_port_that_is_none(tmp_path: Path) -> None:
-    with served(board=str(tmp_path / "no_such_port")) as server:
+    with serve_robot(board=str(tmp_path / "no_such_port")) as server:
         page = Page(server)
         state = page.idle()
         assert not state["connected"]
@@ -200,7 +200,7 @@ def test_boards_of_others_as_far_as_they_can(robot: str, differs: str) -> None:
     arm = armkin.load(str(ROOT / f"tests/robots/{robot}.yaml"))
     goal = units.home_out(arm)
     goal[0] += 10
-    with served(ROOT / f"tests/robots/{robot}.yaml", "sim") as server:
+    with serve_robot(ROOT / f"tests/robots/{robot}.yaml", "sim") as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         state = page.idle()
@@ -234,7 +234,7 @@ def test_the_gripper_of_a_board_of_others_as_by_the_command_line(tmp_path: Path)
     begin, end = text.index("gripper:"), text.index("# The paper has no limit switches")
     path = tmp_path / "spindle.yaml"
     path.write_text(text[:begin] + "gripper: {kind: spindle, open: 40, closed: 200}\n" + text[end:])
-    with served(path, "sim") as server:
+    with serve_robot(path, "sim") as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         page.idle()

@@ -11,10 +11,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import COUNTS, aim, idle, jogged, opened, repainted, settled, standing, until, value, values
+from browsing import (
+    COUNTS,
+    box_value,
+    box_values,
+    hold_jog,
+    open_page,
+    standing_text,
+    type_target,
+    wait_for_answers,
+    wait_for_board,
+    wait_for_repaint,
+    wait_until,
+)
 from matplotlib import image
 from playwright.sync_api import Browser, Page
-from served import served
+from served import serve_robot
 
 import armkin
 from armkin.model import units
@@ -26,7 +38,7 @@ from command_line import ROOT, run
 @pytest.fixture
 def server() -> Iterator[Server]:
     """One of its own for each test: a page that has just been closed still holds control for a moment."""
-    with served() as running:
+    with serve_robot() as running:
         yield running
 
 
@@ -39,7 +51,7 @@ _STOPS = """(selector) => {
 
 
 def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
-    with served(board="sim") as server, opened(browser, server.address) as page:
+    with serve_robot(board="sim") as server, open_page(browser, server.address) as page:
 
         def tab_to(selector: str) -> None:
             for _ in range(page.evaluate(_STOPS, selector)):
@@ -56,35 +68,35 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
                 page.keyboard.press("Control+a")
                 page.keyboard.type(number)
                 page.keyboard.press("Tab")
-            settled(page)
+            wait_for_answers(page)
 
         # Joints: a slider by its arrow keys.
         tab_to("#sliders input[type=range]")
-        before = value(page, "#box-0")
+        before = box_value(page, "#box-0")
         for _ in range(3):
             page.keyboard.press("ArrowRight")
-        settled(page)
-        assert value(page, "#box-0") > before
+        wait_for_answers(page)
+        assert box_value(page, "#box-0") > before
         # The tip: arrows and page keys where nothing has the focus, numbers in its boxes.
         page.evaluate("document.activeElement.blur()")
-        z = value(page, "#target label:nth-child(3) input")
+        z = box_value(page, "#target label:nth-child(3) input")
         page.keyboard.press("PageDown")
-        settled(page)
-        assert value(page, "#target label:nth-child(3) input") == pytest.approx(z - 5)
+        wait_for_answers(page)
+        assert box_value(page, "#target label:nth-child(3) input") == pytest.approx(z - 5)
         type_target()
         page.evaluate("document.activeElement.blur()")
         page.keyboard.press("3")
-        settled(page)
+        wait_for_answers(page)
         chosen = page.locator("#branches [aria-checked=true]")
         assert "left, elbow down" in chosen.inner_text()
         page.keyboard.press("4")
-        settled(page)
+        wait_for_answers(page)
         assert "left, elbow up" in chosen.inner_text()
         # A program: R records, P plays.
         page.keyboard.press("r")
         page.wait_for_selector("#name-0")
         page.keyboard.press("ArrowLeft")
-        settled(page)
+        wait_for_answers(page)
         page.keyboard.press("r")
         page.wait_for_selector("#name-1")
         page.wait_for_selector("#player:not([hidden])")
@@ -93,9 +105,9 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         assert page.input_value("#rate") == "0.25"
         page.evaluate("document.activeElement.blur()")
         page.keyboard.press("p")
-        until(page, "document.querySelector('#play').textContent === 'Pause'")
+        wait_until(page, "document.querySelector('#play').textContent === 'Pause'")
         page.keyboard.press("p")
-        until(page, "document.querySelector('#play').textContent === 'Play'")
+        wait_until(page, "document.querySelector('#play').textContent === 'Play'")
         # The board: send by Enter, STOP by Esc, jog while the space bar is down.
         type_target()  # far from home, wherever the program was paused
         tab_to("#speed")
@@ -103,63 +115,63 @@ def test_everything_by_keyboard_alone(browser: Browser, tmp_path: Path) -> None:
         page.evaluate("document.activeElement.blur()")
         tab_to("#send")
         page.keyboard.press("Enter")
-        until(page, "document.querySelector('#standing').textContent.startsWith('send')")
+        wait_until(page, "document.querySelector('#standing').textContent.startsWith('send')")
         page.keyboard.press("Escape")
-        idle(page, "stopped")
+        wait_for_board(page, "stopped")
         tab_to("#jog-up")
-        jogged(
+        hold_jog(
             page,
             lambda: page.keyboard.down(" "),
             lambda: page.keyboard.up(" "),
-            lambda: standing(page).startswith("jog"),
+            lambda: standing_text(page).startswith("jog"),
         )
         page.keyboard.up(" ")
-        idle(page, "jog: done")
+        wait_for_board(page, "jog: done")
         page.evaluate("document.activeElement.blur()")
         page.keyboard.press("g")
-        idle(page, "grip: done")
+        wait_for_board(page, "grip: done")
 
 
 def test_the_handle_is_dragged_and_the_arm_follows_it(tab: Page) -> None:
-    aim(tab, 350, 0, 250)
+    type_target(tab, 350, 0, 250)
     tab.click("[data-view=front]")
-    repainted(tab)
+    wait_for_repaint(tab)
     x, y = map(float, (tab.get_attribute("#canvas", "data-handle") or "").split())
     box = tab.locator("#canvas").bounding_box()
     assert box is not None
-    before = values(tab, "#target input")
+    before = box_values(tab, "#target input")
     tab.mouse.move(box["x"] + x, box["y"] + y - 45)  # the arrow of z
-    repainted(tab)
+    wait_for_repaint(tab)
     tab.mouse.down()
     for step in range(10):
         tab.mouse.move(box["x"] + x, box["y"] + y - 45 - 4 * step)
     tab.mouse.up()
-    settled(tab)
-    after = values(tab, "#target input")
+    wait_for_answers(tab)
+    after = box_values(tab, "#target input")
     assert after[2] > before[2] + 5
     assert after[:2] == pytest.approx(before[:2], abs=0.01)
     arm = armkin.load(str(ROOT / "robots/three_dof.yaml"))
-    q = [number * 3.141592653589793 / 180 for number in values(tab, "#sliders input[type=number]")]
+    q = [number * 3.141592653589793 / 180 for number in box_values(tab, "#sliders input[type=number]")]
     assert armkin.fk(arm, q)[:3, 3] == pytest.approx(after, abs=0.01)
 
 
 def test_what_cannot_be_reached_is_said(tab: Page) -> None:
-    aim(tab, 2000, 0, 300)
+    type_target(tab, 2000, 0, 300)
     text = tab.inner_text("#answer")
     answer = run("ik", "robots/three_dof.yaml", 2000, 0, 300, "--json").json
     assert text.startswith("unreachable: 0 branches")
     assert f"{answer['closest']['distance_mm']:.4f} mm away" in text
     tab.click("#nearest")
-    settled(tab)
-    assert values(tab, "#sliders input[type=number]") == pytest.approx(answer["closest"]["joints"], abs=1e-4)
+    wait_for_answers(tab)
+    assert box_values(tab, "#sliders input[type=number]") == pytest.approx(answer["closest"]["joints"], abs=1e-4)
     tab.fill("#box-1", "130")
-    settled(tab)
+    wait_for_answers(tab)
     assert tab.inner_text("#outside") == "q2 = 130 deg is outside -20 to 120 deg"
     assert tab.get_attribute("#box-1", "aria-invalid") == "true"
 
 
 def test_what_is_typed_and_is_no_number_is_told_and_not_kept(tab: Page) -> None:
-    aim(tab, 390, 80, 300)
+    type_target(tab, 390, 80, 300)
     box = tab.locator("#box-0")
     for typed, stays in (("", "10.1529"), ("-", "10.1529"), ("1e", "1.0000")):
         box.click()
@@ -171,27 +183,27 @@ def test_what_is_typed_and_is_no_number_is_told_and_not_kept(tab: Page) -> None:
         assert box.input_value() == stays
     tab.fill("#box-0", "12")
     tab.keyboard.press("Tab")
-    settled(tab)
+    wait_for_answers(tab)
     assert tab.inner_text("#trouble") == ""
     assert box.input_value() == "12.0000"
 
 
 def test_a_branch_s_button_stays_the_same_while_the_tip_moves(tab: Page) -> None:
     """Pressed while answers come in, it is still there when the pointer is let go."""
-    aim(tab, 390, 80, 300)
+    type_target(tab, 390, 80, 300)
     tab.hover("#branch-2")
     tab.mouse.down()
     tab.evaluate("document.querySelector('#target input').value = 380")
     tab.dispatch_event("#target input", "input")
-    settled(tab)
+    wait_for_answers(tab)
     tab.mouse.up()
-    settled(tab)
+    wait_for_answers(tab)
     assert tab.locator("#branches [aria-checked=true]").get_attribute("id") == "branch-2"
 
 
 def test_no_barrier_for_those_who_do_not_see_or_use_a_mouse(browser: Browser) -> None:
-    with served(board="sim") as server, opened(browser, server.address, color_scheme="dark") as page:
-        aim(page, 390, 80, 300)
+    with serve_robot(board="sim") as server, open_page(browser, server.address, color_scheme="dark") as page:
+        type_target(page, 390, 80, 300)
         page.click("#record")
         page.wait_for_selector("#name-0")
         page.wait_for_selector("#player:not([hidden])")
@@ -211,18 +223,18 @@ def test_the_manual_s_picture_is_the_page(drawing_browser: Browser, tmp_path: Pa
     """ARMKIN_UPDATE_SNAPSHOTS=1 takes it anew."""
     picture, drawn_now = ROOT / "docs/teach.png", tmp_path / "teach.png"
     with (
-        served("ur5e") as server,
-        opened(drawing_browser, server.address, viewport={"width": 1280, "height": 800}) as page,
+        serve_robot("ur5e") as server,
+        open_page(drawing_browser, server.address, viewport={"width": 1280, "height": 800}) as page,
     ):
         for k, angle in enumerate((20, -70, 80, -60, 70, 10)):
             page.fill(f"#box-{k}", str(angle))
         page.keyboard.press("Tab")
-        settled(page)
+        wait_for_answers(page)
         page.click("[data-view=space]")
         page.evaluate("document.activeElement.blur(); document.querySelector('#panels').scrollTop = 0")
         page.mouse.move(5, 500)
-        repainted(page)
-        until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
+        wait_for_repaint(page)
+        wait_until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
         page.screenshot(path=drawn_now)
     if os.environ.get("ARMKIN_UPDATE_SNAPSHOTS"):
         picture.write_bytes(drawn_now.read_bytes())
@@ -234,40 +246,40 @@ def test_the_manual_s_picture_is_the_page(drawing_browser: Browser, tmp_path: Pa
 
 def test_without_webgl_everything_else_works(browser: Browser) -> None:
     blind = "HTMLCanvasElement.prototype.getContext = () => null"
-    with served(board="sim") as server, opened(browser, server.address, script=blind, quiet=False) as page:
+    with serve_robot(board="sim") as server, open_page(browser, server.address, script=blind, quiet=False) as page:
         assert page.is_visible("#flat")
-        aim(page, 390, 80, 300)
+        type_target(page, 390, 80, 300)
         page.get_by_role("radio", name="left, elbow up").click()
-        settled(page)
+        wait_for_answers(page)
         page.click("#send")
-        idle(page, "send: done")
+        wait_for_board(page, "send: done")
         assert server.actions.standing_pulses() == tuple(COUNTS)
 
 
 def test_the_program_is_saved_and_loaded(tab: Page, tmp_path: Path) -> None:
     for target in ((390, 80, 300), (350, -50, 260)):
-        aim(tab, *target)
+        type_target(tab, *target)
         tab.click("#record")
-        settled(tab)
+        wait_for_answers(tab)
     tab.wait_for_selector("#name-1")
     tab.fill("#name-1", "the other end")
     tab.keyboard.press("Tab")
-    until(tab, "document.querySelector('#name-1').value === 'the other end'")
+    wait_until(tab, "document.querySelector('#name-1').value === 'the other end'")
     tab.click("#show-0")
-    until(tab, "document.querySelector('#target input').value === '390.0000'")
+    wait_until(tab, "document.querySelector('#target input').value === '390.0000'")
     with tab.expect_download() as download:
         tab.click("#save")
     file = tmp_path / "path.yaml"
     download.value.save_as(file)
     assert "armkin path robots/three_dof.yaml three_dof_path.yaml" in tab.inner_text("#saved").replace(f"{ROOT}/", "")
     plan = armkin.path(armkin.load(str(ROOT / "robots/three_dof.yaml")), str(file))
-    until(tab, f"document.querySelector('#planned').textContent.startsWith('{plan.duration:.3f} s')")
+    wait_until(tab, f"document.querySelector('#planned').textContent.startsWith('{plan.duration:.3f} s')")
     tab.click("#clear")
-    until(tab, "!document.querySelector('#moves li')")
+    wait_until(tab, "!document.querySelector('#moves li')")
     tab.set_input_files("#load", str(file))
-    until(tab, "document.querySelector('#name-1')?.value === 'the other end'")
+    wait_until(tab, "document.querySelector('#name-1')?.value === 'the other end'")
     tab.click("#undo")
-    until(tab, "!document.querySelector('#moves li')")
+    wait_until(tab, "!document.querySelector('#moves li')")
 
 
 # Heights of joint 1's drum.
@@ -333,7 +345,7 @@ def test_the_page_draws_the_arm_where_it_is(browser: Browser, server: Server) ->
 @pytest.mark.parametrize("robot", ["ur5e", "cobra600", "moveo", "panda", "pan_tilt"])
 def test_other_arms_have_their_page(browser: Browser, robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "/nowhere/cc")  # machine code of an elimination has tests of its own
-    with served(robot) as server, opened(browser, server.address) as page:
+    with serve_robot(robot) as server, open_page(browser, server.address) as page:
         settled_text = page.inner_text("#answer")
         count = len(page.locator("#branches button").all())
         if robot == "pan_tilt":
@@ -346,6 +358,6 @@ def test_other_arms_have_their_page(browser: Browser, robot: str, monkeypatch: p
         if robot == "panda":
             assert page.get_attribute("button[aria-label^='hold J7']", "aria-pressed") == "true"
             page.click("button[aria-label^='hold J7']")
-            until(page, "!document.querySelector('#branches button')")
+            wait_until(page, "!document.querySelector('#branches button')")
             page.click("button[aria-label^='hold J1']")
             page.wait_for_selector("#branches button")

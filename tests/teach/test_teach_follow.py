@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import idle, jogged, opened, settled, standing, until
+from browsing import hold_jog, open_page, standing_text, wait_for_answers, wait_for_board, wait_until
 from playwright.sync_api import Browser
-from served import Page, served
+from served import Page, serve_robot
 
 from armkin.cli.commands import teach as command
 from armkin.errors import LinkError
@@ -28,7 +28,7 @@ def following(sim: Page) -> Page:
     return sim
 
 
-def rests(page: Page) -> bool:
+def is_at_rest(page: Page) -> bool:
     """Whether nothing moves the arm: the board has been looked at twice since."""
     before = page.idle()["pulses"]
     time.sleep(0.6)
@@ -52,7 +52,7 @@ def test_what_else_the_board_is_told_ends_following(following: Page, name: str) 
     following.idle()
     assert not following.state()["follows"]
     following.act("look", q=[0, 80, -80], goal=True)
-    assert rests(following)
+    assert is_at_rest(following)
 
 
 def test_a_jog_that_ends_leaves_the_arm_there(following: Page) -> None:
@@ -60,17 +60,17 @@ def test_a_jog_that_ends_leaves_the_arm_there(following: Page) -> None:
     following.let_go()
     following.idle()
     following.act("look", q=NEAR)  # as the page asks for its numbers when a job has ended
-    assert rests(following)
+    assert is_at_rest(following)
     assert following.state()["joints"][0] > 12
 
 
 def test_only_what_is_dragged_or_typed_is_a_goal(following: Page) -> None:
     following.act("look", q=NEAR, best=True)  # a setting
     following.act("plan")
-    assert rests(following)
+    assert is_at_rest(following)
     assert following.state()["follows"]
     following.act("look", q=[40, 60, -60])  # the page shows another posture: a preview, a branch, a named pose
-    assert rests(following)
+    assert is_at_rest(following)
     assert not following.state()["follows"]  # a drag from there would take the whole arm along
 
 
@@ -80,7 +80,7 @@ def test_a_take_over_ends_following(following: Page) -> None:
     assert watcher.act("take")[0] == 200
     assert watcher.hear("board", lambda state: not state["follows"])
     assert watcher.act("look", q=HOME, goal=True)[0] == 200
-    assert rests(watcher)
+    assert is_at_rest(watcher)
     watcher.close()
 
 
@@ -93,7 +93,7 @@ def test_it_follows_the_page_that_switched_it_on_alone(following: Page) -> None:
     assert watcher.act("take")[0] == 200
     assert watcher.act("follow", on=True) == (200, {"on": True})
     board.follow_pose(late, following.server.actions.arm.home)
-    assert rests(watcher)
+    assert is_at_rest(watcher)
     watcher.close()
 
 
@@ -121,21 +121,23 @@ def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.Mon
 
 
 def test_the_page_s_follow(browser: Browser) -> None:
-    with served(board="sim") as server, opened(browser, server.address) as page:
+    with serve_robot(board="sim") as server, open_page(browser, server.address) as page:
         second_page = Page(server)
         stands = "document.querySelector('#position').textContent.includes(argument)"
 
         def follow() -> None:
             page.click("#follow")
-            until(page, "document.querySelector('#follow').checked && document.documentElement.dataset.asking === 'no'")
+            wait_until(
+                page, "document.querySelector('#follow').checked && document.documentElement.dataset.asking === 'no'"
+            )
             assert second_page.hear("board", lambda state: state["follows"])
 
         def drag(slider: int, value: float) -> None:
             page.locator("#sliders input[type=range]").nth(slider).fill(str(value))
-            settled(page)
+            wait_for_answers(page)
 
         def unfollowed() -> None:
-            until(page, "!document.querySelector('#follow').checked")
+            wait_until(page, "!document.querySelector('#follow').checked")
 
         def still(counts: object) -> bool:
             page.wait_for_timeout(500)
@@ -144,45 +146,45 @@ def test_the_page_s_follow(browser: Browser) -> None:
         # A drag is followed; what has been shown before it is not.
         page.fill("#box-1", "60")
         page.keyboard.press("Tab")
-        settled(page)
+        wait_for_answers(page)
         follow()
         assert page.input_value("#box-1") == "90.0000"  # where the arm stands
         assert still((0, 0, 0))
         drag(0, 6)
-        until(page, stands, "q1 5.99")
+        wait_until(page, stands, "q1 5.99")
         page.fill("#box-0", "3")
         page.keyboard.press("Tab")
-        until(page, stands, "q1 3.01")
+        wait_until(page, stands, "q1 3.01")
         # A setting is no goal; a branch, a named pose, a preview and its pause end it.
         page.check("#best")
-        settled(page)
+        wait_for_answers(page)
         assert page.is_checked("#follow")
         at = server.actions.standing_pulses()
         for button in ("#branch-0", "#branch-1"):
             page.click(button)
-            settled(page)
+            wait_for_answers(page)
         unfollowed()
         follow()
         page.get_by_role("button", name="home", exact=True).click()
-        settled(page)
+        wait_for_answers(page)
         unfollowed()
         drag(0, 110)  # so far that it plays for seconds
         page.click("#record")
         page.wait_for_selector("#player:not([hidden])")
         follow()
         page.click("#play")
-        until(page, "document.querySelector('#play').textContent === 'Pause'")
+        wait_until(page, "document.querySelector('#play').textContent === 'Pause'")
         unfollowed()
         page.click("#play")
-        settled(page)
+        wait_for_answers(page)
         assert still(at)
         # A jog ends it, and leaves the arm where the button was let go.
         follow()
         page.hover("#jog-up")
-        jogged(page, page.mouse.down, page.mouse.up, lambda: standing(page).startswith("jog"))
+        hold_jog(page, page.mouse.down, page.mouse.up, lambda: standing_text(page).startswith("jog"))
         page.mouse.up()
-        idle(page, "jog: done")
-        settled(page)
+        wait_for_board(page, "jog: done")
+        wait_for_answers(page)
         unfollowed()
         assert still(server.actions.standing_pulses())
         # A page that takes over has it off, and its own drag moves nothing.
@@ -191,7 +193,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
         unfollowed()
         second_page.close()
         page.click("#take")
-        until(page, "!document.querySelector('#panels').inert")
+        wait_until(page, "!document.querySelector('#panels').inert")
         at = server.actions.standing_pulses()
         drag(0, 37.5)
         assert still(at)
@@ -199,7 +201,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
 
 def test_the_key_is_on_no_command_line(browser: Browser) -> None:
     """Every user of a machine sees the words that a program was started with, and a browser is one."""
-    with served() as server:
+    with serve_robot() as server:
         with command.redirection(server.address) as file:
             assert server.guard.key not in file
             path = Path(file.removeprefix("file://"))

@@ -9,15 +9,15 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from served import Page, act, ask, good, port, served
+from served import Page, ask, carry_out_action, good_headers, port_number, serve_robot
 
 from armkin.teach.server import Server
-from quick import least
+from quick import least_seconds
 
 
 @pytest.fixture(scope="module")
 def server() -> Iterator[Server]:
-    with served() as running:
+    with serve_robot() as running:
         yield running
 
 
@@ -37,7 +37,7 @@ def acted(server: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 def test_the_page_itself_may_act(server: Server, acted: list[str]) -> None:
-    assert act(server, "stop") == (200, {})
+    assert carry_out_action(server, "stop") == (200, {})
     assert acted == ["stop"]
 
 
@@ -63,7 +63,7 @@ ATTACKS: dict[str, tuple[dict[str, str | None], int]] = {
 @pytest.mark.parametrize("name", ATTACKS)
 def test_an_attack_does_nothing(server: Server, acted: list[str], name: str) -> None:
     changes, expected = ATTACKS[name]
-    headers = {**good(server), **changes}
+    headers = {**good_headers(server), **changes}
     body = b"{}" if "Transfer-Encoding" not in headers else b"2\r\n{}\r\n0\r\n\r\n"
     status, _, data = ask(server, "POST", "/api/stop", body, {k: v for k, v in headers.items() if v is not None})
     assert status == expected
@@ -72,8 +72,8 @@ def test_an_attack_does_nothing(server: Server, acted: list[str], name: str) -> 
 
 
 def test_the_key_of_another_run_does_nothing(server: Server, acted: list[str]) -> None:
-    with served() as second_server:
-        headers = {**good(server), "X-Armkin-Key": second_server.guard.key}
+    with serve_robot() as second_server:
+        headers = {**good_headers(server), "X-Armkin-Key": second_server.guard.key}
         assert ask(server, "POST", "/api/stop", b"{}", headers)[0] == 403
     assert acted == []
 
@@ -94,14 +94,14 @@ def test_the_key_of_another_run_does_nothing(server: Server, acted: list[str]) -
     ],
 )
 def test_a_body_that_is_no_json_object_is_refused(server: Server, acted: list[str], body: bytes) -> None:
-    status, _, data = ask(server, "POST", "/api/stop", body, good(server))
+    status, _, data = ask(server, "POST", "/api/stop", body, good_headers(server))
     assert status == 400
     assert "JSON" in json.loads(data)["error"]
     assert acted == []
 
 
 def test_ten_megabytes_are_not_read(server: Server, acted: list[str]) -> None:
-    headers = {**good(server), "Content-Length": str(10 << 20)}
+    headers = {**good_headers(server), "Content-Length": str(10 << 20)}
     status, _, _ = ask(server, "POST", "/api/stop", b"x" * 1000, headers)
     assert status == 413
     assert acted == []
@@ -140,7 +140,7 @@ def test_fields_that_are_wrong_are_named(server: Server, fields: Any) -> None:
 
 
 def test_an_unknown_action_or_page_is_refused(server: Server) -> None:
-    assert act(server, "look", {}, tab="nobody")[0] == 410
+    assert carry_out_action(server, "look", {}, tab="nobody")[0] == 410
     page = Page(server)
     assert page.act("no_such_action")[0] == 404
     page.close()
@@ -186,7 +186,7 @@ def test_a_thousand_connections_do_not_keep_the_page_out(server: Server, capfd: 
     page = Page(server)
     idle = []
     for k in range(1000):
-        connection = socket.create_connection(("127.0.0.1", port(server)), timeout=60)
+        connection = socket.create_connection(("127.0.0.1", port_number(server)), timeout=60)
         connection.sendall(b"POST /api/stop HTTP/1.1\r\nHost: x\r\n" if k % 2 else b"")
         idle.append(connection)
         if len(idle) > 500:  # as many as a process may hold here; the server has closed most of them
@@ -196,7 +196,7 @@ def test_a_thousand_connections_do_not_keep_the_page_out(server: Server, capfd: 
         assert page.act("take")[0] == 200
         assert ask(server, "GET", "/")[0] == 200
 
-    assert least(take, 1.0, time.monotonic) < 1.0
+    assert least_seconds(take, 1.0, time.monotonic) < 1.0
     for connection in idle:
         connection.close()
     page.close()
@@ -225,7 +225,7 @@ def test_two_pages_one_control(server: Server) -> None:
 
 def test_a_fifth_page_is_told_to_wait(server: Server) -> None:
     pages = [Page(server) for _ in range(4)]
-    status, answer = act(server, "open")
+    status, answer = carry_out_action(server, "open")
     assert (status, "close one" in answer["error"]) == (429, True)
     for page in pages:
         page.close()

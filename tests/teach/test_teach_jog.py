@@ -22,7 +22,7 @@ BENT = [0.0, 60.0, -60.0]  # three_dof, far from its edges
 SCENES = Path(__file__).parents[2] / "examples" / "scenes"
 
 
-def held(page: Page, has_arrived: Callable[[dict[str, Any]], bool], **jog: Any) -> list[np.ndarray]:
+def jog_until(page: Page, has_arrived: Callable[[dict[str, Any]], bool], **jog: Any) -> list[np.ndarray]:
     """Joint values on the way, while a jog is asked for until the board is there."""
     joints = []
 
@@ -35,39 +35,41 @@ def held(page: Page, has_arrived: Callable[[dict[str, Any]], bool], **jog: Any) 
     return joints
 
 
-def tips(joints: list[np.ndarray]) -> np.ndarray:
+def tips_of(joints: list[np.ndarray]) -> np.ndarray:
     """Where three_dof's tip was, in mm."""
     arm = armkin.load("three_dof")
     return np.array([armkin.fk(arm, units.joints_in(arm, q))[:3, 3] for q in joints])
 
 
-def stand(page: Page, q: list[float]) -> np.ndarray:
+def send_to(page: Page, q: list[float]) -> np.ndarray:
     """Send the arm there; its tip as the pins have it."""
     assert page.act("send", q=q, speed=100)[0] == 200
-    tip: np.ndarray = tips([np.array(page.idle()["joints"])])[0]
+    tip: np.ndarray = tips_of([np.array(page.idle()["joints"])])[0]
     return tip
 
 
 def test_the_tip_keeps_its_line_and_stops_when_nobody_asks(sim: Page) -> None:
-    begin = stand(sim, BENT)
-    joints = held(sim, lambda now: abs(tips([now["joints"]])[0][1] - begin[1]) > 40, axis="y", frame="base", percent=40)
+    begin = send_to(sim, BENT)
+    joints = jog_until(
+        sim, lambda now: abs(tips_of([now["joints"]])[0][1] - begin[1]) > 40, axis="y", frame="base", percent=40
+    )
     assert sim.state()["doing"] == "jog"
     began = sim.clock()  # the page falls silent
     state = sim.idle()
     assert sim.clock() - began < 1.5  # 0.3 s after the last sign of life it brakes
     assert (state["position"], state["error"]) == ("known", "")
-    way = tips([*joints, np.array(state["joints"])]) - begin
+    way = tips_of([*joints, np.array(state["joints"])]) - begin
     assert 40 < way[-1][1] < 200  # the line would have gone on to the edge of the reach
     assert np.abs(way[:, [0, 2]]).max() < 0.05 + 0.15  # the tolerance, and half a step of each joint at the tip
     assert (np.diff(way[:, 1]) > -0.2).all()
-    held(sim, lambda now: tips([now["joints"]])[0][1] < begin[1] + 20, axis="y", frame="base", percent=-40)
+    jog_until(sim, lambda now: tips_of([now["joints"]])[0][1] < begin[1] + 20, axis="y", frame="base", percent=-40)
     sim.let_go()
     sim.idle()
 
 
 def test_a_late_sign_of_life_does_not_revive_a_jog_that_brakes(sim: Page) -> None:
-    begin = stand(sim, BENT)
-    held(sim, lambda now: abs(tips([now["joints"]])[0][2] - begin[2]) > 5, axis="z", frame="base", percent=-20)
+    begin = send_to(sim, BENT)
+    jog_until(sim, lambda now: abs(tips_of([now["joints"]])[0][2] - begin[2]) > 5, axis="z", frame="base", percent=-20)
     for _ in range(20):
         if sim.state()["doing"] != "jog":
             break
@@ -81,8 +83,8 @@ def test_a_late_sign_of_life_does_not_revive_a_jog_that_brakes(sim: Page) -> Non
 
 
 def test_stop_passes_a_jog_of_the_tip(sim: Page) -> None:
-    begin = stand(sim, BENT)
-    held(sim, lambda now: abs(tips([now["joints"]])[0][2] - begin[2]) > 5, axis="z", frame="base", percent=-20)
+    begin = send_to(sim, BENT)
+    jog_until(sim, lambda now: abs(tips_of([now["joints"]])[0][2] - begin[2]) > 5, axis="z", frame="base", percent=-20)
     assert sim.act("stop")[0] == 200
     assert sim.idle()["error"] == "stopped"
     assert sim.act("send", q=BENT, speed=100)[0] == 200
@@ -90,8 +92,8 @@ def test_stop_passes_a_jog_of_the_tip(sim: Page) -> None:
 
 
 def test_it_rests_before_a_limit_and_says_which(sim: Page) -> None:
-    stand(sim, BENT)
-    held(sim, lambda now: "limit" in now["error"], axis="x", frame="base", percent=-100)
+    send_to(sim, BENT)
+    jog_until(sim, lambda now: "limit" in now["error"], axis="x", frame="base", percent=-100)
     state = sim.idle()
     assert "q2 is at its limit" in state["error"]
     assert state["position"] == "known"

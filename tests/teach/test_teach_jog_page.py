@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from functools import partial
 
-from browsing import jogged, opened, standing, until
+from browsing import hold_jog, open_page, standing_text, wait_until
 from playwright.sync_api import Browser
-from served import served
+from served import serve_robot
 
 # A gamepad that the test holds: Chromium has none without a hand.
 _PAD = """
@@ -38,19 +38,19 @@ _AT = "document.querySelector('#position').textContent"
 
 
 def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_charted(browser: Browser) -> None:
-    with served(board="sim") as server, opened(browser, server.address, script=_PAD) as page:
-        until(page, f"{_AT}.startsWith('It stands')")
+    with serve_robot(board="sim") as server, open_page(browser, server.address, script=_PAD) as page:
+        wait_until(page, f"{_AT}.startsWith('It stands')")
 
         def joints() -> list[float]:
             return [float(x) for x in re.findall(r" (-?[\d.]+)(?:,|\.$)", page.text_content("#position") or "")]
 
         def jogs(*, ends: bool = False) -> None:
             sign = "!" if ends else ""
-            until(page, f"{sign}document.querySelector('#standing').textContent.startsWith('jog')")
+            wait_until(page, f"{sign}document.querySelector('#standing').textContent.startsWith('jog')")
 
         def looked(times: int) -> None:
             """Until the page has looked at the gamepad: a busy one does so late."""
-            until(page, "looked >= argument", page.evaluate("looked") + times)
+            wait_until(page, "looked >= argument", page.evaluate("looked") + times)
 
         page.fill("#jog-speed", "10")
         groups = page.locator("#jog-joint optgroup").all()
@@ -62,7 +62,7 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
             f"document.querySelector('#live-keys').textContent.includes('apart') && !{_AT}.includes('q2 90.00')"
         )
         down, up = partial(page.keyboard.down, "Space"), partial(page.keyboard.up, "Space")
-        jogged(page, down, up, lambda: page.evaluate(charted))
+        hold_jog(page, down, up, lambda: page.evaluate(charted))
         up()
         jogs(ends=True)
         assert page.text_content("#trouble") == ""
@@ -77,7 +77,7 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         assert joints() == stands
         page.evaluate("() => { pad.buttons[5].pressed = false; }")
         page.check("#gamepad")
-        until(page, "document.querySelector('#pad').textContent.includes('hold a shoulder')")
+        wait_until(page, "document.querySelector('#pad').textContent.includes('hold a shoulder')")
         assert page.locator("#pad b").count() == 0  # its name is text
         looked(6)
         assert joints() == stands
@@ -87,17 +87,17 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
             page.evaluate(let_go)
             looked(2)
 
-        jogged(page, partial(page.evaluate, pull), release, lambda: page.text_content("#position") != stood)
+        hold_jog(page, partial(page.evaluate, pull), release, lambda: page.text_content("#position") != stood)
         release()
         jogs(ends=True)
         assert joints()[1] < stands[1]  # forwards again
         # STOP, by the pad or the page, with the shoulder button still held: what is held on begins no other jog.
         for stop in ("pad.buttons[1].pressed = true", "document.querySelector('#stop').click()"):
             for _ in range(20):  # on a busy computer the jog may end by itself before the request arrives
-                jogged(page, partial(page.evaluate, pull), release, lambda: standing(page).startswith("jog"))
+                hold_jog(page, partial(page.evaluate, pull), release, lambda: standing_text(page).startswith("jog"))
                 page.evaluate(f"() => {{ {stop}; }}")
                 jogs(ends=True)
-                until(page, "document.querySelector('#arrived').textContent !== ''")
+                wait_until(page, "document.querySelector('#arrived').textContent !== ''")
                 page.evaluate("() => { pad.buttons[1].pressed = false; }")
                 if (page.text_content("#arrived") or "").startswith("stopped"):
                     break
@@ -110,18 +110,18 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
 
 
 def test_a_jog_whose_signs_of_life_came_late_begins_no_other(browser: Browser) -> None:
-    with served(board="sim") as server, opened(browser, server.address, script=_LATE) as page:
-        until(page, f"{_AT}.startsWith('It stands')")
+    with serve_robot(board="sim") as server, open_page(browser, server.address, script=_LATE) as page:
+        wait_until(page, f"{_AT}.startsWith('It stands')")
         page.locator("#jog-up").focus()
         for _ in range(20):  # on a busy computer the jog may end before the page's clock gave a sign of life
             page.evaluate("() => { document.querySelector('#arrived').textContent = ''; }")
             page.keyboard.down("Space")
-            until(page, "document.querySelector('#arrived').textContent.startsWith('jog: done: let go')")
+            wait_until(page, "document.querySelector('#arrived').textContent.startsWith('jog: done: let go')")
             stood = page.text_content("#position")
             if page.evaluate("begun > 0"):
                 break
             page.keyboard.up("Space")
-        until(page, "begun > 0 && answered === begun")
+        wait_until(page, "begun > 0 && answered === begun")
         page.keyboard.down("Space")  # as a key that is held repeats itself
         page.wait_for_timeout(300)
         page.keyboard.up("Space")
@@ -129,5 +129,5 @@ def test_a_jog_whose_signs_of_life_came_late_begins_no_other(browser: Browser) -
         assert page.text_content("#position") == stood
         assert page.text_content("#trouble") == ""
         page.keyboard.down("Space")
-        until(page, f"{_AT} !== argument", stood)
+        wait_until(page, f"{_AT} !== argument", stood)
         page.keyboard.up("Space")

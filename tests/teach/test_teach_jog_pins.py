@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from emulator import EmulatedBoard
-from pins import net, rests_within
-from served import Page, served
+from pins import net_steps, rests_within
+from served import Page, serve_robot
 
 import armkin
 
@@ -27,7 +27,7 @@ def tips_from(board: EmulatedBoard, arm: armkin.Arm, counts: list[int]) -> np.nd
 
 def test_every_step_keeps_the_line_and_a_lost_sign_of_life_stops_it() -> None:
     arm = armkin.load("three_dof")
-    with EmulatedBoard(trace=True) as board, served(board=board.port) as server:
+    with EmulatedBoard(trace=True) as board, serve_robot(board=board.port) as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         page.idle()
@@ -35,17 +35,20 @@ def test_every_step_keeps_the_line_and_a_lost_sign_of_life_stops_it() -> None:
         page.idle()
         assert page.act("send", q=BENT, speed=100)[0] == 200
         began = page.idle()["pulses"]
-        assert began == net(board)
+        assert began == net_steps(board)
         start = armkin.fk(arm, armkin.joints(arm, began))[:3, 3]
         far = start[1] + 30
         page.jog(
-            lambda now: armkin.fk(arm, armkin.joints(arm, net(board)))[1, 3] >= far, axis="y", frame="base", percent=40
+            lambda now: armkin.fk(arm, armkin.joints(arm, net_steps(board)))[1, 3] >= far,
+            axis="y",
+            frame="base",
+            percent=40,
         )
         rests_within(board, 1.5)  # 0.3 s after the last sign of life it brakes
         state = page.idle()
         page.close()
         assert (state["position"], state["error"]) == ("known", "")
-        assert state["pulses"] == net(board)
+        assert state["pulses"] == net_steps(board)
         way = tips_from(board, arm, began) - start
         stats = board.stats()
     assert 30 < way[-1][1] < 200  # the line would have gone on to the edge of the reach

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from browsing import aim, opened, settled, until
+from browsing import open_page, type_target, wait_for_answers, wait_until
 from playwright.sync_api import Browser
-from served import serving
+from served import serve_actions
 
 import armkin
 from armkin.teach.actions import Actions
@@ -20,26 +20,26 @@ def arm() -> armkin.Arm:
 
 
 def test_a_hit_is_red_and_send_says_why_not(arm: armkin.Arm, browser: Browser) -> None:
-    with serving(Actions(arm, "sim")) as server, opened(browser, server.address) as page:
+    with serve_actions(Actions(arm, "sim")) as server, open_page(browser, server.address) as page:
         red = "document.getElementById('canvas').dataset.red"
         assert page.evaluate(red) == ""
         for joint, value in enumerate(HIT):
             page.fill(f"#box-{joint}", str(value))
             page.press(f"#box-{joint}", "Enter")
-            settled(page)
-        until(page, f"{red} === '3'")
+            wait_for_answers(page)
+        wait_until(page, f"{red} === '3'")
         assert "it hits table by 47.5 mm (q3)" in page.inner_text("#outside")
         before = server.actions.board.thread.state()["pulses"]  # type: ignore[union-attr]
         page.click("#send")
-        until(page, "document.getElementById('trouble').innerText.includes('q3 would hit table')")
+        wait_until(page, "document.getElementById('trouble').innerText.includes('q3 would hit table')")
         assert server.actions.board.thread.state()["pulses"] == before  # type: ignore[union-attr]
         # A program whose line goes through the table.
-        aim(page, 300, 280, 200)
+        type_target(page, 300, 280, 200)
         page.click("#record")
-        aim(page, 380, 0, 30)
+        type_target(page, 380, 0, 30)
         page.select_option("#kind", "line")
         page.click("#record")
-        until(page, "document.getElementById('canvas').dataset.hit")
+        wait_until(page, "document.getElementById('canvas').dataset.hit")
         assert "table" in page.inner_text("#planned")
         assert page.get_attribute("#planned", "class") == "bad"
 

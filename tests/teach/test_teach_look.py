@@ -19,18 +19,18 @@ from command_line import ROOT, run
 ROBOTS = sorted(path.stem for path in (ROOT / "robots").glob("*.yaml"))
 
 
-def arm(name: str) -> armkin.Arm:
+def load_robot(name: str) -> armkin.Arm:
     return armkin.load(str(ROOT / f"robots/{name}.yaml"))
 
 
-def asked(name: str, q: Sequence[float], **more: Any) -> dict[str, Any]:
-    one = arm(name)
+def ask_pose(name: str, q: Sequence[float], **more: Any) -> dict[str, Any]:
+    one = load_robot(name)
     return answer_question(one, Question(units.joints_in(one, q), **more))
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_robot_has_a_scene_and_a_first_picture(robot: str) -> None:
-    one = arm(robot)
+    one = load_robot(robot)
     held = first_lock(one)
     drawn = scene_json(one)
     answer = answer_question(one, Question(one.home, held=() if held is None else (held,)))
@@ -56,7 +56,7 @@ def test_every_robot_has_a_scene_and_a_first_picture(robot: str) -> None:
 def test_branches_are_those_of_ik(robot: str, target: list[float]) -> None:
     file = f"robots/{robot}.yaml"
     by_command = run("ik", file, *target, "--all-branches", "--json").json
-    answer = asked(robot, units.home_out(arm(robot)), target=target)
+    answer = ask_pose(robot, units.home_out(load_robot(robot)), target=target)
     assert answer["status"] == by_command["status"]
     assert answer["complete"] == by_command["complete"]
     assert [(b["name"], b["joints"], b["within_limits"]) for b in answer["branches"]] == [
@@ -74,7 +74,7 @@ def test_pulses_and_tip_are_those_of_the_command_line(best: bool) -> None:
     pose = [-30, 5, -5]
     by_command = run("pulses", "robots/three_dof.yaml", *pose, "--json", *(["--best"] if best else [])).json
     pose_answer = run("fk", "robots/three_dof.yaml", *pose, "--json").json
-    answer = asked("three_dof", pose, best=best)
+    answer = ask_pose("three_dof", pose, best=best)
     assert answer["motors"]["pulses"] == by_command["pulses"]
     assert answer["motors"]["moves"] == by_command["moves"]
     assert answer["motors"]["error_mm"] == by_command["error_mm"]
@@ -82,48 +82,48 @@ def test_pulses_and_tip_are_those_of_the_command_line(best: bool) -> None:
 
 
 def test_a_pose_is_on_one_of_its_branches() -> None:
-    answer = asked("three_dof", [20, 30, 40])
+    answer = ask_pose("three_dof", [20, 30, 40])
     assert answer["branches"][answer["chosen"]]["joints"] == pytest.approx([20, 30, 40])
     assert answer["outside"] == []
 
 
 def test_what_is_outside_is_said_in_words() -> None:
-    answer = asked("three_dof", [0, 130, 0])
+    answer = ask_pose("three_dof", [0, 130, 0])
     assert answer["outside"] == ["q2 = 130 deg is outside -20 to 120 deg"]
 
 
 def test_a_branch_is_kept_while_the_target_moves() -> None:
-    answer = asked("three_dof", [0, 90, -90], target=[390, 80, 300], branch="left, elbow down")
+    answer = ask_pose("three_dof", [0, 90, -90], target=[390, 80, 300], branch="left, elbow down")
     assert answer["branches"][answer["chosen"]]["name"] == "left, elbow down"
 
 
 def test_seven_joints_need_one_that_is_held() -> None:
-    home = units.home_out(arm("panda"))
-    free = asked("panda", home)
+    home = units.home_out(load_robot("panda"))
+    free = ask_pose("panda", home)
     assert free["task"] is None
     assert "panda" in free["why"]
-    held = asked("panda", home, held=("J3",))
+    held = ask_pose("panda", home, held=("J3",))
     assert len(held["branches"]) == 8
     assert all(branch["joints"][2] == pytest.approx(home[2]) for branch in held["branches"])
-    assert scene_json(arm("panda"))["lock"] == "J7"  # the redundant one, as info names it
-    assert len(asked("panda", home, held=("J7",))["branches"]) == 8
+    assert scene_json(load_robot("panda"))["lock"] == "J7"  # the redundant one, as info names it
+    assert len(ask_pose("panda", home, held=("J7",))["branches"]) == 8
 
 
 def test_free_joints_of_a_self_motion_are_named() -> None:
-    answer = asked("puma560", [0, 0, 0, 20, 0, 30])
+    answer = ask_pose("puma560", [0, 0, 0, 20, 0, 30])
     assert answer["status"] == "singular"
     assert answer["free"] == ["J4", "J6"] or len(answer["free"]) == 2
 
 
 def test_moves_start_where_the_arm_stands() -> None:
-    answer = asked("three_dof", [-30, 5, -5], standing_pulses=(-1000, 0, 0))
+    answer = ask_pose("three_dof", [-30, 5, -5], standing_pulses=(-1000, 0, 0))
     assert answer["motors"]["moves"] == [-67, -10144, 5667]
     assert answer["motors"]["from"] == "arm"
 
 
 @pytest.mark.parametrize(("robot", "held"), [("jaco_j2n6s300", ()), ("kinova_gen3", ("J7",))])
 def test_an_elimination_is_answered_by_machine_code_as_soon_as_that_is_built(robot: str, held: tuple[str, ...]) -> None:
-    one = arm(robot)
+    one = load_robot(robot)
     pose = units.home_out(one) + np.linspace(9, 3, one.n)
     question = Question(units.joints_in(one, pose), held=held)
     slow, quick = answer_question(one, question), QuickIk()
@@ -140,7 +140,7 @@ def test_an_elimination_is_answered_by_machine_code_as_soon_as_that_is_built(rob
 
 
 def test_without_a_compiler_an_elimination_is_answered_in_python(monkeypatch: pytest.MonkeyPatch) -> None:
-    one, quick = arm("xarm6"), QuickIk()
+    one, quick = load_robot("xarm6"), QuickIk()
     monkeypatch.setenv("CC", "/nowhere/cc")
     question = Question(units.joints_in(one, [10.0, 20, -30, 40, 50, 60]))
     assert answer_question(one, question, quick) == answer_question(one, question)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from browsing import aim, idle, opened, until
+from browsing import open_page, type_target, wait_for_board, wait_until
 from playwright.sync_api import Browser
-from served import served
+from served import serve_robot
 
 
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:
-    with served(board="sim") as server, opened(browser, server.address) as page:
+    with serve_robot(board="sim") as server, open_page(browser, server.address) as page:
         base = server.address.split("/#")[0]
         acts: list[str] = []
         before = server.actions.act
@@ -48,25 +48,25 @@ def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: P
 
 def test_two_pages_and_a_take_over_on_purpose(browser: Browser) -> None:
     with (
-        served(board="sim") as server,
-        opened(browser, server.address) as first,
-        opened(browser, server.address) as second,
+        serve_robot(board="sim") as server,
+        open_page(browser, server.address) as first,
+        open_page(browser, server.address) as second,
     ):
-        until(second, "document.querySelector('#control').textContent.includes('another page')")
+        wait_until(second, "document.querySelector('#control').textContent.includes('another page')")
         assert second.evaluate("document.querySelector('#panels').inert")
-        aim(first, 390, 80, 300)
+        type_target(first, 390, 80, 300)
         first.click("#record")
         first.wait_for_selector("#player:not([hidden])")
-        until(second, "document.querySelector('#name-0')")
+        wait_until(second, "document.querySelector('#name-0')")
         second.wait_for_timeout(300)
         assert second.inner_text("#trouble") == second.inner_text("#planned") == ""  # who watches asks for nothing
         first.fill("#speed", "5")
-        until(second, "document.querySelector('#box-0').value === '10.1529'")
+        wait_until(second, "document.querySelector('#box-0').value === '10.1529'")
         first.click("#send")
-        until(second, "document.querySelector('#standing').textContent.startsWith('send')")
+        wait_until(second, "document.querySelector('#standing').textContent.startsWith('send')")
         second.click("#stop")  # works in both
-        idle(first, "stopped")
+        wait_for_board(first, "stopped")
         second.click("#take")
-        until(first, "document.querySelector('#panels').inert")
-        until(second, "!document.querySelector('#panels').inert")
+        wait_until(first, "document.querySelector('#panels').inert")
+        wait_until(second, "!document.querySelector('#panels').inert")
         second.wait_for_selector("#player:not([hidden])")  # whoever holds control has the plan

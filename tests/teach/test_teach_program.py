@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from served import Page, served
+from served import Page, serve_robot
 
 import armkin
 from armkin import path_file
@@ -152,7 +152,7 @@ def test_a_file_that_is_no_path_changes_nothing(program: Program, text: str) -> 
 
 
 def test_pages_share_one_program() -> None:
-    with served() as server:
+    with serve_robot() as server:
         first, second = Page(server), Page(server)
         first.hear("control", lambda news: news["holder"] == "yours")
         status, state = first.act("program", do="record", kind="joint", q=POSES[0])
@@ -217,7 +217,7 @@ def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Ar
 def test_an_edit_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
     import armkin.motion.path
 
-    with served() as server:
+    with serve_robot() as server:
         page = Page(server)
         assert page.act("program", do="record", kind="joint", q=POSES[0])[0] == 200
         begun, go_on, plan = threading.Event(), threading.Event(), armkin.motion.path.path

@@ -13,8 +13,8 @@ from typing import Any
 
 import pytest
 from emulator import EmulatedBoard
-from pins import net, rests_within
-from served import MOVES, Elsewhere, Page, served
+from pins import net_steps, rests_within
+from served import MOVES, Elsewhere, Page, serve_robot
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.wire.session import Session
@@ -25,7 +25,7 @@ HOME = [0, 90, -90]
 
 @pytest.fixture
 def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
-    with EmulatedBoard() as board, served(board=board.port) as server:
+    with EmulatedBoard() as board, serve_robot(board=board.port) as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         page.idle()
@@ -33,7 +33,7 @@ def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
         page.close()
 
 
-def told(page: Page) -> Any:
+def state_after(page: Page) -> Any:
     """The board's state once it has done what it was asked for."""
     state = page.idle()
     assert state["error"] == ""
@@ -47,7 +47,7 @@ def begin_move(page: Page, board: EmulatedBoard) -> None:
         assert page.idle()["position"] == "known"
     assert page.act("send", q=POSE, speed=20)[0] == 200
     end = time.monotonic() + 60
-    while net(board)[1] > -2000:
+    while net_steps(board)[1] > -2000:
         assert time.monotonic() < end, page.state()
         time.sleep(0.01)
 
@@ -60,13 +60,13 @@ def test_a_lost_position_is_not_sent_from_and_home_is_assumed_with_consent(
     page.act("send", q=POSE, speed=100)
     assert "position is lost" in page.idle()["error"]
     assert page.act("assume_home")[0] == 422  # without the consent
-    assert net(board) == [0, 0, 0]
+    assert net_steps(board) == [0, 0, 0]
     page.act("assume_home", consent=True)
     state = page.idle()
     assert (state["position"], state["pulses"]) == ("known", [0, 0, 0])
     page.act("send", q=POSE, speed=100)
-    assert told(page)["pulses"] == COUNTS
-    assert net(board) == COUNTS
+    assert state_after(page)["pulses"] == COUNTS
+    assert net_steps(board) == COUNTS
 
 
 def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under_way(
@@ -108,7 +108,7 @@ def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under
         took.append(held[0] - began)
         assert state["error"] == "stopped"
         assert state["position"] == "known"
-        assert state["pulses"] == net(board)
+        assert state["pulses"] == net_steps(board)
         page.act("send", q=HOME, speed=100)
         page.idle()
     assert min(took) < 0.1
@@ -121,7 +121,7 @@ def test_a_closed_page_holds_the_arm(emulated: tuple[Page, EmulatedBoard]) -> No
     rests_within(board, 1.0)
     state = page.idle()
     assert state["position"] == "known"
-    assert state["pulses"] == net(board) != COUNTS
+    assert state["pulses"] == net_steps(board) != COUNTS
 
 
 def test_a_watching_page_that_is_closed_holds_nothing(emulated: tuple[Page, EmulatedBoard]) -> None:
@@ -129,7 +129,7 @@ def test_a_watching_page_that_is_closed_holds_nothing(emulated: tuple[Page, Emul
     watcher = Page(page.server)
     begin_move(page, board)
     watcher.close()
-    assert told(page)["pulses"] == COUNTS
+    assert state_after(page)["pulses"] == COUNTS
 
 
 def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
             page.act("assume_home", consent=True)
             page.act("send", q=POSE, speed=20)
             end = time.monotonic() + 60
-            while net(board)[1] > -2000:
+            while net_steps(board)[1] > -2000:
                 assert time.monotonic() < end
                 time.sleep(0.01)
             board.control("patience off")
@@ -153,7 +153,7 @@ def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
             status = page.hear(lambda state: bool(state["error"]))
             assert "half a second" in status["error"]
             assert status["position"] == "known"
-            assert status["pulses"] == net(board)
+            assert status["pulses"] == net_steps(board)
             process.send_signal(signal.SIGTERM)
             assert process.wait(60) == 143
             assert process.stderr is not None
@@ -165,7 +165,7 @@ def test_a_paused_server_holds_the_arm(tmp_path: Path) -> None:
 
 def test_a_server_that_ends_stops_the_arm_first() -> None:
     with EmulatedBoard() as board:
-        with served(board=board.port) as server:
+        with serve_robot(board=board.port) as server:
             page = Page(server)
             page.hear("control", lambda news: news["holder"] == "yours")
             page.idle()
@@ -178,7 +178,7 @@ def test_a_server_that_ends_stops_the_arm_first() -> None:
 
 def test_switches_are_found_from_the_page(tmp_path: Path) -> None:
     robot = with_switches(tmp_path / "homing.yaml")
-    with EmulatedBoard() as board, served(robot, board.port) as server:
+    with EmulatedBoard() as board, serve_robot(robot, board.port) as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         assert page.idle()["position"] == "lost"
@@ -186,16 +186,16 @@ def test_switches_are_found_from_the_page(tmp_path: Path) -> None:
         assert page.act("home") == (200, {})
         state = page.idle()
         assert (state["position"], state["error"]) == ("known", "")
-        assert_found(state["pulses"], net(board))
+        assert_found(state["pulses"], net_steps(board))
         page.act("send", q=POSE, speed=100)
-        assert told(page)["pulses"] == COUNTS
+        assert state_after(page)["pulses"] == COUNTS
         page.close()
 
 
 def test_switches_are_found_in_simulation(tmp_path: Path) -> None:
     robot = with_switches(tmp_path / "homing.yaml")
     robot.write_text(robot.read_text().replace("speed: 20", "speed: 60"))  # it takes its time there, too
-    with served(robot, "sim") as server:
+    with serve_robot(robot, "sim") as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
         page.idle()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browsing import opened, until
+from browsing import open_page, wait_until
 from playwright.sync_api import Browser
-from served import serving
+from served import serve_actions
 
 import armkin
 from armkin.errors import UsageError
@@ -18,13 +18,13 @@ from armkin.teach.reach_slice import ACROSS, DIRECTIONS, VALUES, reach_slice
 
 def test_voxels_are_shown_and_hidden_again(browser: Browser) -> None:
     arm = armkin.load("three_dof")
-    with serving(Actions(arm)) as server, opened(browser, server.address) as page:
+    with serve_actions(Actions(arm)) as server, open_page(browser, server.address) as page:
         slice_button = page.get_by_role("button", name="Slice")
         slice_button.click()
-        until(page, "document.getElementById('legend').innerText.includes('share of 1 orientations')")
+        wait_until(page, "document.getElementById('legend').innerText.includes('share of 1 orientations')")
         assert slice_button.get_attribute("aria-pressed") == "true"
         slice_button.click()
-        until(page, "!document.getElementById('legend').innerText.includes('voxels')")
+        wait_until(page, "!document.getElementById('legend').innerText.includes('voxels')")
 
 
 def test_a_voxel_says_what_ik_says_of_its_centre() -> None:

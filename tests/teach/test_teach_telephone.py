@@ -6,10 +6,10 @@ import io
 
 import numpy as np
 import pytest
-from browsing import COUNTS, aim, opened, settled, until, value
+from browsing import COUNTS, box_value, open_page, type_target, wait_for_answers, wait_until
 from matplotlib import image
 from playwright.sync_api import Browser
-from served import served
+from served import serve_robot
 
 # Firefox names the graphics card itself, and complains in its console of who asks for more.
 _NAMED = """
@@ -32,7 +32,7 @@ _BELOW = """() => document.querySelector('#views').getBoundingClientRect().botto
 
 def test_a_telephone_s_window(browser: Browser) -> None:
     narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
-    with served() as server, opened(browser, server.address, script=_NAMED, **narrow) as page:
+    with serve_robot() as server, open_page(browser, server.address, script=_NAMED, **narrow) as page:
         assert page.evaluate("document.documentElement.scrollWidth") <= 390
         page.locator("#motors").scroll_into_view_if_needed()
         box = page.locator("#stop").bounding_box()
@@ -40,7 +40,7 @@ def test_a_telephone_s_window(browser: Browser) -> None:
         assert 0 <= box["y"] < 100  # STOP stays in sight
         rights = "buttons => buttons.map((one) => one.getBoundingClientRect().right)"
         assert max(page.locator("#views button:visible").evaluate_all(rights)) <= 390  # none of them is cut
-        aim(page, 390, 80, 300)
+        type_target(page, 390, 80, 300)
         assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
         # A finger that swipes over a slider scrolls, and turns no joint; one that goes along it does.
         slider = page.locator("#sliders input[type=range]").nth(1)
@@ -50,30 +50,30 @@ def test_a_telephone_s_window(browser: Browser) -> None:
             rect = slider.bounding_box()
             assert rect is not None
             x, y = rect["x"] + 0.3 * rect["width"], rect["y"] + rect["height"] / 2
-            before, scrolled = value(page, "#box-1"), page.evaluate("scrollY")
+            before, scrolled = box_value(page, "#box-1"), page.evaluate("scrollY")
             for k in range(10):
                 kind, point = ("touchMove" if k else "touchStart"), {"x": x + across * k, "y": y + down * k}
                 line.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [point]})
             line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
             if not turns:
-                until(page, "scrollY > argument", scrolled)
-            settled(page)
-            assert (value(page, "#box-1") != before) is turns
-            assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(value(page, "#box-1"), abs=0.02)
+                wait_until(page, "scrollY > argument", scrolled)
+            wait_for_answers(page)
+            assert (box_value(page, "#box-1") != before) is turns
+            assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(box_value(page, "#box-1"), abs=0.02)
 
 
 def test_fit_fits_the_slice_of_reach_in(drawing_browser: Browser) -> None:
     """Its voxels change the picture, and nothing at the picture's sides and lower edge."""
     narrow = {"viewport": {"width": 390, "height": 800}, "has_touch": True}
-    with served() as server, opened(drawing_browser, server.address, **narrow) as page:
+    with serve_robot() as server, open_page(drawing_browser, server.address, **narrow) as page:
         canvas = page.locator("#canvas")
 
         def picture() -> np.ndarray:
-            until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
+            wait_until(page, "document.querySelector('#canvas').dataset.coarse === 'false'")
             return image.imread(io.BytesIO(canvas.screenshot()))[..., :3]
 
         page.get_by_role("button", name="Slice").click()
-        until(page, "document.getElementById('legend').innerText.includes('voxels')")
+        wait_until(page, "document.getElementById('legend').innerText.includes('voxels')")
         page.evaluate(_NO_LEGEND)
         page.get_by_role("button", name="Fit").click()
         page.wait_for_timeout(100)
@@ -90,12 +90,12 @@ def test_fit_fits_the_slice_of_reach_in(drawing_browser: Browser) -> None:
 
 def test_what_went_wrong_is_seen_wherever_one_has_scrolled_to(browser: Browser) -> None:
     with (
-        served(board="sim") as server,
-        opened(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page,
+        serve_robot(board="sim") as server,
+        open_page(browser, server.address, viewport={"width": 390, "height": 800}, has_touch=True) as page,
     ):
         page.locator("#home").scroll_into_view_if_needed()
         page.click("#home")  # it has no switches
-        until(page, "document.querySelector('#trouble').textContent.includes('homing')")
+        wait_until(page, "document.querySelector('#trouble').textContent.includes('homing')")
         for part in ("#trouble", "#stop"):
             box = page.locator(part).bounding_box()
             assert box is not None
