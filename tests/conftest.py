@@ -18,8 +18,8 @@ import pytest
 from hypothesis import settings
 from xdist.remote import Producer
 
-from distribution import Distribution, mix_order
 from slow import SLOW
+from worker_shares import Distribution, mix_order
 
 # Before numpy is imported: its threads bring small matrices nothing, and those of two workers wait for one another.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -56,12 +56,12 @@ if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
 # What is collected stays until the end: looking through it for garbage again and again took a third of the collecting.
 gc.disable()
 
-import built_once  # noqa: E402
-import quickly_built  # noqa: E402
-from quickly_built import optimised, quickly  # noqa: E402, F401  # fixtures
+import arm_cache  # noqa: E402
+import unoptimised_builds  # noqa: E402
+from unoptimised_builds import optimised, quickly  # noqa: E402, F401  # fixtures
 
-built_once.install()
-quickly_built.install()
+arm_cache.install()
+unoptimised_builds.install()
 
 _HERE = Path(__file__).parent
 # Helpers that compile the firmware, or run it in the emulator.

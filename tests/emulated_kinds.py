@@ -18,7 +18,7 @@ from armkin.board.sim.sim_servo_bus import Servo
 from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from other_programs import GRBL, OURS
-from starting_elsewhere import KINDS
+from simulated_starts import KINDS
 
 
 def emulate_ours(board: Board, sim: Any) -> Emulated:

@@ -15,7 +15,7 @@ import armkin
 from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
 from command_line import ROOT, run
-from quick import least_seconds
+from least_time import least_seconds
 
 LONG = ["1" * 9_990, "0" * 9_990, "1" + "_" * 9_990, "1_" * 4_990]
 

@@ -2,7 +2,7 @@
 
     python tests/bench/bench_calibration.py [seeds for harm, by default 200]
 
-The truth is made by tests/calibration/workshop.py.
+The truth is made by tests/calibration/built_arms.py.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 import armkin
 
 sys.path[:0] = [str(Path(__file__).parents[1] / "calibration")]
-from workshop import Built, build_real_arm, measure_tips, random_commands, rms_distance  # noqa: E402
+from built_arms import Built, build_real_arm, measure_tips, random_commands, rms_distance  # noqa: E402
 
 # arm, noise [mm], play [deg], what a prototype reached [mm]; the bar is 1.5 times as much
 FIGURES = [

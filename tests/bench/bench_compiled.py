@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
 
 from bench_ik import ROBOTS, best_time, peer_job, random_joints, targets_of
-from exported import compare_answers
+from exported_c import compare_answers
 
 import armkin
 

@@ -14,7 +14,7 @@ import numpy as np
 
 import random_drawings
 from armkin.errors import PathFileError
-from read_twice import drawing_off, program_off, program_read
+from reader_comparison import drawing_off, program_off, program_read
 
 BROKEN = ("G1 X", "G33 X1", "G1 X1 X2", "G0 G1 X1", "G1 X#1", "G2 X1 Y1", "G1 X1..2", "G5 X1 Y1", "G1 X1 Q2", "G81 X1")
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from random import Random
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "engines"))
-from kills import Cluster, begin_batch, disturb_batch, file_digest, write_rows
+from cluster_kills import Cluster, begin_batch, disturb_batch, file_digest, write_rows
 
 ROWS = 200_000  # seven parts
 

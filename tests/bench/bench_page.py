@@ -26,9 +26,9 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
 
-from browsing import chromium  # noqa: E402
+from browser_page import chromium  # noqa: E402
 from playwright.sync_api import Browser, Page  # noqa: E402
-from served import run_teach  # noqa: E402
+from served_page import run_teach  # noqa: E402
 
 import armkin  # noqa: E402
 from armkin.robot_file import catalogue  # noqa: E402

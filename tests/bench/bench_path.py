@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 
-import brute
+import brute_force_reach
 from lines import random_line
 
 import armkin
@@ -72,12 +72,12 @@ def print_branches(lines: int) -> None:
                 (columns.s[c.carries_to(0)] for c in chains if c.first == 0 and c.carries_to(0) >= 0), default=-1.0
             )
             carried += mine >= way.length - 1e-9
-            apart = abs(mine - brute.reach_length(arm, way.targets, dense, 0.05))
+            apart = abs(mine - brute_force_reach.reach_length(arm, way.targets, dense, 0.05))
             reach_error, differ = max(reach_error, apart), differ + (apart > 0.01)
             length = [columns.s[run.last] - columns.s[run.first] for run in fewest_runs(chains, len(columns.s))]
             for finer_by in (1, 10):  # a run that is shorter than their step is none to the samples
                 s = np.linspace(0, way.length, 1000 * finer_by + 1)
-                unlike = sum(x > s[1] for x in length) != len(brute.fewest_runs(arm, way.targets(s), 0.05))
+                unlike = sum(x > s[1] for x in length) != len(brute_force_reach.fewest_runs(arm, way.targets(s), 0.05))
                 if not unlike:
                     break
             unlike_runs += unlike

@@ -22,7 +22,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "motion"))
 
-import brute
+import brute_force_reach
 from closed_curves import harmonic_curve, on_path
 from lines import random_line
 
@@ -123,7 +123,7 @@ def print_lines(count: int) -> None:
         arm, rng = arm_with_rates(ARMS[k % len(ARMS)]), np.random.default_rng(1000 + k)
         way = random_line(arm, rng)
         ends = way.targets(np.array([0.0, way.length]))
-        carried = brute.reach_length(arm, way.targets, np.linspace(0, way.length, 601), 0.05) == way.length
+        carried = brute_force_reach.reach_length(arm, way.targets, np.linspace(0, way.length, 601), 0.05) == way.length
         try:
             end = armkin.path(arm, ends).motion.end
             distance = np.linalg.norm(armkin.fk(arm, end)[: arm.n, 3][:2] - _position(ends[1])[:2])
@@ -153,7 +153,7 @@ def print_homes(names: list[str]) -> None:
             kind = _outcome(arm, moves)
             T = np.tile(armkin.fk(arm, arm.home), (201, 1, 1))
             T[:, :3, 3] += np.linspace(0, 1, 201)[:, None] * way
-            alive = brute.carried_nodes(arm, T, 0.05, start=arm.home[None])
+            alive = brute_force_reach.carried_nodes(arm, T, 0.05, start=arm.home[None])
             tally[kind] += 1
             tally[3] += (kind == 0) != (len(alive) == len(T))
         print(f"{name:18} {tally[0]:6d} {tally[1]:8d} {tally[2]:8d} {tally[3]:16d}", flush=True)

@@ -23,7 +23,7 @@ import armkin
 from armkin.errors import UsageError
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "export"))
-from exported import Exported
+from exported_c import Exported
 from exported_js import ask_module
 
 ARMS = ["ur5e", "puma560", "irb120", "jaco_j2n6s300", "fanuc_crx10ia", "ur10e", "xarm6", "kuka_kr6_r700", "thor", "ar4"]

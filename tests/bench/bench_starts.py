@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 sys.path.insert(0, str(Path(__file__).parents[1] / "firmware"))
 
 from armkin.errors import NoSolutionError
-from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Result, carried_out, simulated_kind
+from simulated_starts import ELSEWHERE, EXAMPLES, KINDS, PATHS, Result, carried_out, simulated_kind
 
 NUMBERS = range(1, len(ELSEWHERE) + 1)
 Paths = dict[str, dict[str, Any]]

@@ -24,7 +24,7 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
 
-from browsing import chromium  # noqa: E402
+from browser_page import chromium  # noqa: E402
 from playwright.sync_api import Browser, ViewportSize  # noqa: E402
 
 from armkin.robot_file import catalogue  # noqa: E402

@@ -24,9 +24,9 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 
 import oracle
 import truth
-from checks import Array, Report, examine_answers, not_found, random_joints
 from geometries import CLASSES, random_case, right_angles
 from geometries import case_of as case_of
+from ik_checks import Array, Report, examine_answers, not_found, random_joints
 from test_every_branch import NAMES, shipped_arm
 from test_nearly_special import OFF, move_axes
 

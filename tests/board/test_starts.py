@@ -16,7 +16,7 @@ from armkin.motion.joint_moves import plan_joint_moves as plan_joints
 from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import run
-from starting_elsewhere import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, simulated_kind
+from simulated_starts import ELSEWHERE, EXAMPLES, KINDS, PATHS, Kind, carried_out, simulated_kind
 
 THREE_DOF = armkin.load("three_dof")
 

@@ -23,7 +23,7 @@ from armkin.model import build_arm as arms
 from armkin.model.arm import Arm
 from armkin.motion.timing import profile
 from armkin.motors import joints, pulses
-from quick import least_seconds
+from least_time import least_seconds
 
 CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, counts_to_segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from workshop import build_real_arm, measure_tips, random_commands
+from built_arms import build_real_arm, measure_tips, random_commands
 
 import armkin
 from command_line import run

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from workshop import build_real_arm, measure_tips, random_commands, rms_distance
+from built_arms import build_real_arm, measure_tips, random_commands, rms_distance
 
 import armkin
 from armkin import robot_file
@@ -18,7 +18,7 @@ from armkin.calibration.calibrate_arm import next_poses
 from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.errors import UsageError
 from armkin.model.build_arm import arm_of_file
-from quick import least_seconds
+from least_time import least_seconds
 
 # arm, noise [mm], tip error on unseen poses that a prototype reached with 60 rows [mm]; the bar is 1.5 times as much
 FIGURES = [("ur5e", 0.1, 0.079), ("ar4", 0.1, 0.082), ("three_dof", 0.1, 0.064)]

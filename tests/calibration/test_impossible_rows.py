@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from workshop import build_real_arm, measure_tips, random_commands
+from built_arms import build_real_arm, measure_tips, random_commands
 
 import armkin
 from armkin.errors import UsageError

@@ -21,22 +21,24 @@ import pytest
 import armkin
 from armkin.board.kinds.firmware import FirmwareBoard
 from command_line import ROOT, Result, run
-from person import ENTER, Person, keys_for_direction
+from scripted_operator import ENTER, ScriptedOperator, keys_for_direction
 
 
 @pytest.fixture
-def begin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tuple[Result, Person, Path]]:
+def begin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tuple[Result, ScriptedOperator, Path]]:
     """Runs the command on a copy of a shipped robot, with keys: its result, who pressed them, the file."""
 
-    def go(robot: str, keys: Sequence[str], *options: object, looks: int = 10_000) -> tuple[Result, Person, Path]:
+    def go(
+        robot: str, keys: Sequence[str], *options: object, looks: int = 10_000
+    ) -> tuple[Result, ScriptedOperator, Path]:
         path = tmp_path / "mine.yaml"
         if not path.exists():
             shutil.copy(ROOT / "robots" / f"{robot}.yaml", path)
             path.chmod(0o644)
-        person = Person(keys, looks)
+        person = ScriptedOperator(keys, looks)
 
         @contextmanager
-        def keys_of() -> Iterator[Person]:
+        def keys_of() -> Iterator[ScriptedOperator]:
             yield person
 
         monkeypatch.setattr("armkin.cli.commands.begin.keys", keys_of)
@@ -45,7 +47,9 @@ def begin(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[..., tupl
     return go
 
 
-def test_the_file_is_corrected_and_its_comments_stay(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
+def test_the_file_is_corrected_and_its_comments_stay(
+    begin: Callable[..., tuple[Result, ScriptedOperator, Path]],
+) -> None:
     keys = [
         *keys_for_direction("y"),
         *keys_for_direction("n"),
@@ -74,7 +78,7 @@ def test_the_file_is_corrected_and_its_comments_stay(begin: Callable[..., tuple[
 
 
 def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_degrees(
-    begin: Callable[..., tuple[Result, Person, Path]], monkeypatch: pytest.MonkeyPatch
+    begin: Callable[..., tuple[Result, ScriptedOperator, Path]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jogs: list[tuple[float, float]] = []
     jog = FirmwareBoard.jog
@@ -100,7 +104,9 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
     assert "has moved by 2" in " ".join(person.heard)
 
 
-def test_no_is_no_and_a_shipped_robot_stays(begin: Callable[..., tuple[Result, Person, Path]], tmp_path: Path) -> None:
+def test_no_is_no_and_a_shipped_robot_stays(
+    begin: Callable[..., tuple[Result, ScriptedOperator, Path]], tmp_path: Path
+) -> None:
     keys = [*keys_for_direction("n"), *keys_for_direction("y"), *keys_for_direction("y"), "y", ENTER, "s", "n"]
     completed, _, path = begin("three_dof", keys)
     assert completed.code == 0, completed.err
@@ -111,7 +117,9 @@ def test_no_is_no_and_a_shipped_robot_stays(begin: Callable[..., tuple[Result, P
     assert run("begin", path, "--port", "sim", "--out", path).code == 1, "it is there already"
 
 
-def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
+def test_limits_leave_home_in_and_a_failed_check_is_told(
+    begin: Callable[..., tuple[Result, ScriptedOperator, Path]],
+) -> None:
     keys = [*keys_for_direction("y") * 3, "y", "1", "]", "2", "+", "]", "q", ENTER, "y", "n", "y"]
     completed, _, path = begin("three_dof", keys, looks=50)
     assert completed.code == 0, completed.err
@@ -121,7 +129,7 @@ def test_limits_leave_home_in_and_a_failed_check_is_told(begin: Callable[..., tu
 
 
 def test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board(
-    begin: Callable[..., tuple[Result, Person, Path]],
+    begin: Callable[..., tuple[Result, ScriptedOperator, Path]],
 ) -> None:
     completed, _, path = begin(
         "puma560", [*keys_for_direction("n"), *keys_for_direction("y") * 5, "y", ENTER, "y", "y"]
@@ -133,7 +141,7 @@ def test_a_table_without_drives_moves_on_named_assumptions_and_on_no_board(
     assert (refused.code, "have no drive" in refused.err) == (2, True)
 
 
-def test_bus_servos_are_put_to_their_zeros_by_hand(begin: Callable[..., tuple[Result, Person, Path]]) -> None:
+def test_bus_servos_are_put_to_their_zeros_by_hand(begin: Callable[..., tuple[Result, ScriptedOperator, Path]]) -> None:
     joints = armkin.load("so101").n
     completed, person, _ = begin(
         "so101", [*keys_for_direction("y") * joints, "y", ENTER, ENTER, "y", "y", "y"], looks=3

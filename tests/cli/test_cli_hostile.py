@@ -17,7 +17,7 @@ from pathlib import Path
 import pytest
 
 from command_line import ROOT, THREE_DOF, Result, run
-from quick import least_seconds
+from least_time import least_seconds
 
 SNAPSHOT = ROOT / "tests/snapshots/cli_errors.txt"
 DOF = THREE_DOF

@@ -14,7 +14,7 @@ from pathlib import Path
 from random import Random
 from threading import Thread
 
-import kills
+import cluster_kills
 import numpy as np
 import pytest
 
@@ -24,21 +24,21 @@ from armkin.engines import dask_cluster
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ClusterError
 from command_line import ROOT, THREE_DOF, run
-from killed_once import square_or_die
+from killing_chunks import square_or_die
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[kills.Cluster]:
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[cluster_kills.Cluster]:
     """A scheduler with two worker processes, whose nanny starts another for one that is killed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.fspath(ROOT / "tests"))  # where the work is
-        cluster = kills.Cluster(tmp_path_factory.mktemp("cluster"), 2)
+        cluster = cluster_kills.Cluster(tmp_path_factory.mktemp("cluster"), 2)
         yield cluster
         cluster.close()
 
 
 @pytest.fixture
-def address(whole: kills.Cluster) -> str:
+def address(whole: cluster_kills.Cluster) -> str:
     """The scheduler's; one that was killed has a successor."""
     return whole.address
 
@@ -54,7 +54,7 @@ def test_a_killed_worker_loses_its_chunk_alone(address: str, engine_kind: str, t
 _POOL = """
 import os, sys
 from armkin.engines.ordered_chunks import Engine, in_order
-from killed_once import wait_for_ever
+from killing_chunks import wait_for_ever
 if __name__ == "__main__":
     for found in in_order(Engine(workers=2), wait_for_ever, "", range(9)):
         print(found, flush=True)
@@ -119,18 +119,20 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A batch's input, and the digest of its answers."""
     folder = tmp_path_factory.mktemp("undisturbed")
     source, target = folder / "in.csv", folder / "one.csv"
-    kills.write_rows(source, 60_000)
-    kills.begin_batch(source, target).communicate(timeout=kills.PATIENCE)
-    return source, kills.file_digest(target)
+    cluster_kills.write_rows(source, 60_000)
+    cluster_kills.begin_batch(source, target).communicate(timeout=cluster_kills.PATIENCE)
+    return source, cluster_kills.file_digest(target)
 
 
 @pytest.mark.parametrize("victim", ["worker", "client", "scheduler"])
 def test_a_kill_costs_at_most_the_chunks_in_hand(
-    victim: str, whole: kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
+    victim: str, whole: cluster_kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
 ) -> None:
     """One of each here; twenty of each: tests/bench/bench_kills.py."""
     source, expected = undisturbed
-    disturbed = kills.disturb_batch(source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3)
+    disturbed = cluster_kills.disturb_batch(
+        source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3
+    )
     assert disturbed.same, disturbed
     assert disturbed.redone == 0
     assert disturbed.code in {"worker": (0, 3), "client": (0, 3, -9), "scheduler": (0, 1, 3)}[victim], disturbed

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from exported import Exported, compare_answers, random_postures, texts_of
+from exported_c import Exported, compare_answers, random_postures, texts_of
 
 import armkin
 import right_angles

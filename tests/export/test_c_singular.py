@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import truth
-from exported import Exported
+from exported_c import Exported
 from test_every_branch import shipped_arm
 
 from armkin.inverse.solvers.recognise import solver

@@ -14,7 +14,7 @@ from armkin.board.kinds import board_of
 from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file
 from other_programs import OURS
-from starting_elsewhere import KINDS
+from simulated_starts import KINDS
 
 
 def starter_of(board: EmulatedBoard) -> Start:

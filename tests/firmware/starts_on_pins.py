@@ -14,7 +14,7 @@ from pins import net_steps
 import armkin
 from armkin.errors import NoSolutionError
 from command_line import THREE_DOF, run, run_patiently
-from starting_elsewhere import Result, judge_motion
+from simulated_starts import Result, judge_motion
 
 
 def send_path_from(board: EmulatedBoard, folder: Path, moves: dict[str, Any], place: Sequence[float]) -> Result:

@@ -12,7 +12,7 @@ from emulator import EmulatedBoard
 
 import armkin
 from command_line import ROOT, run
-from person import ENTER, Person, keys_for_direction
+from scripted_operator import ENTER, ScriptedOperator, keys_for_direction
 
 
 def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
@@ -24,10 +24,10 @@ def test_a_lost_arm_is_brought_home_by_keys_and_a_motor_turns_the_other_way(
     keys = [*keys_for_direction("y"), *keys_for_direction("n"), *keys_for_direction("y")]  # directions
     keys += ["2", "-", ENTER]  # zeros: the second joint is taken back a little
     keys += [ENTER, "y", "y", "y"]  # limits; the first move; check; write
-    person = Person(keys, looks=20)
+    person = ScriptedOperator(keys, looks=20)
 
     @contextmanager
-    def keys_of() -> Iterator[Person]:
+    def keys_of() -> Iterator[ScriptedOperator]:
         yield person
 
     monkeypatch.setattr("armkin.cli.commands.begin.keys", keys_of)

@@ -7,7 +7,7 @@ from pathlib import Path
 import starts_on_pins
 from emulator import EmulatedBoard
 
-from starting_elsewhere import PATHS
+from simulated_starts import PATHS
 
 
 def test_a_path_is_driven_where_it_is(tmp_path: Path) -> None:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import examine_answers, random_joints
 from geometries import CLASSES, Case, case_of, random_case
+from ik_checks import examine_answers, random_joints
 from oracle import distance, forward, goal_of_joints, pose_error, screws_of
 
 import armkin

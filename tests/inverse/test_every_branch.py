@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import Report, examine_answers, not_found, random_joints
 from geometries import CLASSES, random_case
+from ik_checks import Report, examine_answers, not_found, random_joints
 from oracle import Screws, exponential, forward, screws_of
 
 import armkin

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from checks import random_joints
+from ik_checks import random_joints
 from oracle import forward, forward_and_jacobian, screws_of
 
 import armkin

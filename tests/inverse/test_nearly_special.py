@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from checks import Report, examine_answers, random_joints
 from geometries import random_case
+from ik_checks import Report, examine_answers, random_joints
 from oracle import Screws, rotation, shift
 from test_every_branch import shipped_arm
 

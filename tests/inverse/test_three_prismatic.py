@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import truth
-from checks import examine_answers, random_joints
 from geometries import AXIS, Case, case_of, random_case, random_screws
+from ik_checks import examine_answers, random_joints
 from oracle import goal_of_joints
 from test_nearly_special import move_axes
 

@@ -36,7 +36,7 @@ from armkin.board_catalogue import BOARDS
 from armkin.keep_out.body_pairs import Guard, guard
 from armkin.motion.timing.trajectory import Trajectory
 from command_line import ROOT, Result, run
-from starting_elsewhere import KINDS, watch_counts
+from simulated_starts import KINDS, watch_counts
 
 SCENE = """
 clearance: 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
-import brute
+import brute_force_reach
 import numpy as np
 import pytest
 from lines import random_line
@@ -27,7 +27,7 @@ def test_reach_is_that_of_brute_force(name: str) -> None:
         chains = chains_of_columns(arm, columns)
         mine = max((columns.s[c.carries_to(0)] for c in chains if c.first == 0 and c.carries_to(0) >= 0), default=-1.0)
         dense = np.linspace(0, way.length, 401)
-        reached = brute.last_sample(arm, way.targets(dense), 0.05)
+        reached = brute_force_reach.last_sample(arm, way.targets(dense), 0.05)
         assert mine <= (dense[min(reached + 1, 400)] if reached >= 0 else 0.0) + 1e-6
         assert mine >= (dense[reached] if reached >= 0 else -1.0) - 1e-6
         runs = fewest_runs(chains, len(columns.s))

@@ -11,7 +11,7 @@ import random_drawings
 from armkin.errors import PathFileError
 from armkin.path_file import csv_path, gcode, svg
 from armkin.path_file.drawing import DrawingOptions
-from read_twice import AS_IT_IS
+from reader_comparison import AS_IT_IS
 
 _JUNK = [b"1e999", b"-", b"nan", b"(", b"%", b"<g>", b"\0", b"\xff\xfe", b"N1*5", b"G10 L20 P9", b"R-1", b"F0", b"P1e9",
          b"G2 X0 Y0 I0 J0\n", b"G4 P9e9\n", b"#1=5\n", b'transform="scale(0)"', b"A0 0 0 0 0 0 0", b"e"]  # fmt: skip

@@ -7,7 +7,7 @@ import pytest
 
 import random_drawings
 from armkin.errors import PathFileError
-from read_twice import drawing_off, program_off, program_read, refusal, spoil_drawing
+from reader_comparison import drawing_off, program_off, program_read, refusal, spoil_drawing
 
 
 @pytest.mark.parametrize("seed", range(12))

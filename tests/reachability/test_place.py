@@ -19,7 +19,7 @@ from armkin.reachability import place_path, place_targets, place_upright
 from armkin.reachability import place_search as places
 from armkin.reachability.place_arm import Obstacles, arm_at_place
 from command_line import ROOT, run
-from interrupted import interrupt_at
+from ctrl_c import interrupt_at
 
 
 @pytest.mark.parametrize("name", ["ur5e", "puma560", "three_dof", "planar_3dof", "so101", "stanford"])

@@ -16,7 +16,7 @@ from armkin.reachability import voxels
 from armkin.reachability.cell_answers import TURN, Question, cell_columns
 from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
-from interrupted import interrupt_at
+from ctrl_c import interrupt_at
 
 ARMS = (
     "ur5e",

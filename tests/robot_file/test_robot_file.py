@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from armkin import robot_file
 from armkin.errors import ArmkinError, FileError, RobotFileError
 from hostile_robot_files import DH, MOTORS, SCREWS, SERVO, VALID, hostile_files
-from quick import least_seconds
+from least_time import least_seconds
 
 ROOT = Path(__file__).parents[2]
 SNAPSHOT = Path(__file__).parents[1] / "snapshots" / "robot_file_errors.txt"

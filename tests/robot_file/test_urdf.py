@@ -16,7 +16,7 @@ from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import urdf_reader
 from armkin.robot_file.robot_file_text import format_robot_file, number_text, rpy_angles
 from command_line import ROOT, run
-from quick import least_seconds
+from least_time import least_seconds
 from urdf_chains import CHAINS, moving_joints, tip_pose
 from urdf_chains import urdf_text as as_urdf
 

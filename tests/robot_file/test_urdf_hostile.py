@@ -13,7 +13,7 @@ import pytest
 
 import armkin
 from command_line import run, run_process
-from quick import least_seconds
+from least_time import least_seconds
 
 WORDS = [
     *("", "a: b # \"x\" 'y'", "a\u0085b", "a\u2028b", "a\tb", "\u00e4\u20ac\U0001f600", "x" * 5000, "{a: b}", "[1]"),

@@ -10,10 +10,10 @@ from pathlib import Path
 from types import ModuleType
 
 import pytest
-from browsing import NO_PIXELS, chromium, launch_browser, open_page
+from browser_page import NO_PIXELS, chromium, launch_browser, open_page
 from playwright.sync_api import Browser
 from playwright.sync_api import Page as Tab
-from served import Page, serve_robot
+from served_page import Page, serve_robot
 
 sys.path.append(str(Path(__file__).parents[1] / "firmware"))
 
@@ -30,7 +30,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @cache
 def _needs_browser(module: ModuleType) -> bool:
-    return any(getattr(value, "__module__", None) == "browsing" for value in vars(module).values())
+    return any(getattr(value, "__module__", None) == "browser_page" for value in vars(module).values())
 
 
 @pytest.fixture(scope="module")

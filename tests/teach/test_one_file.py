@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import box_values, open_page, wait_for_answers, wait_for_repaint, wait_until
+from browser_page import box_values, open_page, wait_for_answers, wait_for_repaint, wait_until
 from playwright.sync_api import Browser, Page, expect
 
 import armkin

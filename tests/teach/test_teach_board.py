@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from served import Page, serve_robot
+from served_page import Page, serve_robot
 
 import armkin
 from armkin.model import units

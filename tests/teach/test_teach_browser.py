@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from browsing import (
+from browser_page import (
     COUNTS,
     box_value,
     box_values,
@@ -26,7 +26,7 @@ from browsing import (
 )
 from matplotlib import image
 from playwright.sync_api import Browser, Page
-from served import serve_robot
+from served_page import serve_robot
 
 import armkin
 from armkin.model import units

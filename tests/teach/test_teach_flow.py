@@ -4,11 +4,20 @@ from __future__ import annotations
 
 import time
 
-from browsing import COUNTS, box_values, hold_jog, open_page, type_target, wait_for_answers, wait_for_board, wait_until
+from browser_page import (
+    COUNTS,
+    box_values,
+    hold_jog,
+    open_page,
+    type_target,
+    wait_for_answers,
+    wait_for_board,
+    wait_until,
+)
 from emulator import EmulatedBoard
 from pins import net_steps
 from playwright.sync_api import Browser, Page
-from served import run_teach
+from served_page import run_teach
 
 from command_line import run
 

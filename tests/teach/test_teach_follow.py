@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browsing import hold_jog, open_page, standing_text, wait_for_answers, wait_for_board, wait_until
+from browser_page import hold_jog, open_page, standing_text, wait_for_answers, wait_for_board, wait_until
 from playwright.sync_api import Browser
-from served import Page, serve_robot
+from served_page import Page, serve_robot
 
 from armkin.cli.commands import teach as command
 from armkin.errors import LinkError

@@ -10,11 +10,11 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from browsing import COUNTS, NO_PIXELS, launch_browser, type_target, wait_for_board, wait_until
+from browser_page import COUNTS, NO_PIXELS, launch_browser, type_target, wait_for_board, wait_until
 from emulator import EmulatedBoard
 from pins import net_steps, rests_within
 from playwright.sync_api import Browser
-from served import Elsewhere, run_teach
+from served_page import Elsewhere, run_teach
 
 
 @pytest.mark.parametrize("how", ["its tab is closed", "its browser is killed"])

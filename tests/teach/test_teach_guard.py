@@ -9,10 +9,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import pytest
-from served import Page, ask, carry_out_action, good_headers, port_number, serve_robot
+from served_page import Page, ask, carry_out_action, good_headers, port_number, serve_robot
 
 from armkin.teach.server import Server
-from quick import least_seconds
+from least_time import least_seconds
 
 
 @pytest.fixture(scope="module")

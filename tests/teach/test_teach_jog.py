@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from served import Page
+from served_page import Page
 
 import armkin
 from armkin.errors import NoSolutionError, UsageError

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from functools import partial
 
-from browsing import hold_jog, open_page, standing_text, wait_until
+from browser_page import hold_jog, open_page, standing_text, wait_until
 from playwright.sync_api import Browser
-from served import serve_robot
+from served_page import serve_robot
 
 # A gamepad that the test holds: Chromium has none without a hand.
 _PAD = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from emulator import EmulatedBoard
 from pins import net_steps, rests_within
-from served import Page, serve_robot
+from served_page import Page, serve_robot
 
 import armkin
 

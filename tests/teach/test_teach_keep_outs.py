@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import pytest
-from browsing import open_page, type_target, wait_for_answers, wait_until
+from browser_page import open_page, type_target, wait_for_answers, wait_until
 from playwright.sync_api import Browser
-from served import serve_actions
+from served_page import serve_actions
 
 import armkin
 from armkin.teach.actions import Actions

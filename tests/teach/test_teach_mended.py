@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browsing import open_page, type_target, wait_for_answers, wait_for_repaint, wait_until
+from browser_page import open_page, type_target, wait_for_answers, wait_for_repaint, wait_until
 from playwright.sync_api import Browser, Page, Route
-from served import run_teach, serve_robot
+from served_page import run_teach, serve_robot
 
 import armkin
 

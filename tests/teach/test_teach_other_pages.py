@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from browsing import open_page, type_target, wait_for_board, wait_until
+from browser_page import open_page, type_target, wait_for_board, wait_until
 from playwright.sync_api import Browser
-from served import serve_robot
+from served_page import serve_robot
 
 
 def test_another_page_of_the_browser_moves_nothing(browser: Browser, tmp_path: Path) -> None:

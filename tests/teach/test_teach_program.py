@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from served import Page, serve_robot
+from served_page import Page, serve_robot
 
 import armkin
 from armkin import path_file

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from emulator import EmulatedBoard
 from pins import net_steps, rests_within
-from served import MOVES, Elsewhere, Page, serve_robot
+from served_page import MOVES, Elsewhere, Page, serve_robot
 from switches import assert_found, fit_switches, with_switches
 
 from armkin.board.firmware.wire.session import Session

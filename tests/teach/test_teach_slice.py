@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from browsing import open_page, wait_until
+from browser_page import open_page, wait_until
 from playwright.sync_api import Browser
-from served import serve_actions
+from served_page import serve_actions
 
 import armkin
 from armkin.errors import UsageError

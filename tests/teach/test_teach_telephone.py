@@ -6,10 +6,10 @@ import io
 
 import numpy as np
 import pytest
-from browsing import COUNTS, box_value, open_page, type_target, wait_for_answers, wait_until
+from browser_page import COUNTS, box_value, open_page, type_target, wait_for_answers, wait_until
 from matplotlib import image
 from playwright.sync_api import Browser
-from served import serve_robot
+from served_page import serve_robot
 
 # Firefox names the graphics card itself, and complains in its console of who asks for more.
 _NAMED = """

@@ -13,9 +13,9 @@ import pytest
 from xdist.scheduler import LoadScopeScheduling
 
 _ROOT = Path(__file__).parents[1]
-_BROWSER = re.compile(r"^(?:from|import) browsing\b", re.MULTILINE)
+_BROWSER = re.compile(r"^(?:from|import) browser_page\b", re.MULTILINE)
 # helpers that compile the firmware, or an exported arm; a cluster; an installed kind; syntax trees of the whole package
-_HELPERS = "emulator|measure|bare_host|exported|kills|emulated_kinds|ast"
+_HELPERS = "emulator|measure|bare_host|exported_c|cluster_kills|emulated_kinds|ast"
 _SHARED = re.compile(rf"^(?:from|import) (?:{_HELPERS})\b", re.MULTILINE)
 
 

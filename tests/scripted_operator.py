@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 ENTER = "\n"
 
 
-class Person:
+class ScriptedOperator:
     """Presses keys in an order: a joint's key is held for as long as it may go, or for `looks` looks at it."""
 
     def __init__(self, keys: Sequence[str], looks: int = 10_000) -> None:
