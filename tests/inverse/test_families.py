@@ -77,7 +77,7 @@ def count_over_a_turn(arm: armkin.Arm, target: np.ndarray, values: np.ndarray) -
     """Legal postures of joint 7 at values (K,): its closed form asked at each."""
     find = Follower(ik, arm, redundancy(arm, None), target[None], np.zeros((1, 7)))  # type: ignore[arg-type]
     rows = np.zeros(len(values), np.intp)
-    q = find.found(rows, values)
+    q = find.branches_at(rows, values)
     _, legal = nearest_row(arm, np.nan_to_num(q), np.zeros(arm.n))
     return np.asarray((legal & ~np.isnan(q[:, :, 0])).sum(axis=1))
 

@@ -120,7 +120,7 @@ class Recorded:
         which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where the
         candidate is far from its target. near: (N, n). Also of which targets (N,) these may not lead to all.
         """
-        q, miss = self._shifted(target, near, ROUND)
+        q, miss = self._at_shifts(target, near, ROUND)
         if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
             return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
         exact = np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
@@ -139,14 +139,14 @@ class Recorded:
         rows = np.flatnonzero(lost & ~linkage)
         if len(rows):
             random = np.full((len(q), (FREED + SHAKEN) * q.shape[2], self.arm.n), np.nan)
-            random[rows] = self._random(target[rows], near[rows])
+            random[rows] = self._at_random_values(target[rows], near[rows])
             more.append(random)
         branch = np.concatenate([np.arange(part.shape[1]) % q.shape[2] for part in more])
         return np.concatenate(more, axis=1), branch, lost if self.geometry.ends else np.zeros_like(lost)
 
     def samples(self, target: Array, near: Array) -> Array:
         """Candidates (N, FREED, B, n) with values for free joints all round; nan where they miss their target."""
-        q, miss = self._shifted(target, near, ROUND)
+        q, miss = self._at_shifts(target, near, ROUND)
         return np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
 
     def best_shift(self, target: Array, near: Array, loose: Bool) -> tuple[Array, Bool]:
@@ -159,7 +159,7 @@ class Recorded:
         best, open_, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
         for closer in range(CLOSER):
             single[open_] = closer > 0
-            _, miss = self._shifted(target[open_], near[open_], best[open_, None] + shift)
+            _, miss = self._at_shifts(target[open_], near[open_], best[open_, None] + shift)
             size = np.where(loose[open_, None], miss, np.inf).min(axis=2)
             best[open_] += shift[size.argmin(axis=1)]
             open_ = open_[~(size.min(axis=1) <= (tol.ROUNDING if closer else tol.ACCEPTED) ** 2)]
@@ -169,12 +169,12 @@ class Recorded:
             shift = apart * np.arange(-16.0, 17.0)[:, None]
         return best, single
 
-    def _shifted(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
+    def _at_shifts(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) with free joints so far from `near`, (S, 1) or (N, S, 1); squared residuals."""
         values = near[:, None] + shift * np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
-        return self._at(np.repeat(target[:, None], values.shape[1], axis=1), values)
+        return self._at_values(np.repeat(target[:, None], values.shape[1], axis=1), values)
 
-    def _random(self, target: Array, near: Array) -> Array:
+    def _at_random_values(self, target: Array, near: Array) -> Array:
         """Candidates (N, M, n) with random values for joints that are free, and of targets moved to where none is."""
         rng, n = np.random.default_rng(4), self.arm.n
         unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
@@ -182,10 +182,10 @@ class Recorded:
         goals = np.repeat(target[:, None], len(offsets), axis=1)
         for k in range(FREED, len(offsets)):
             goals[:, k] = shifted_targets(self.arm, self.task, target, tol.SHAKE * rng.uniform(-1, 1, 6))
-        q, miss = self._at(goals, near[:, None] + offsets)
+        q, miss = self._at_values(goals, near[:, None] + offsets)
         return _each_once(np.where((miss < tol.HOPELESS**2)[..., None], q, np.nan))
 
-    def _at(self, goals: Array, values: Array) -> tuple[Array, Array]:
+    def _at_values(self, goals: Array, values: Array) -> tuple[Array, Array]:
         """Candidates (N, S, B, n) of targets (N, S, ...) with values (N, S, n) for free joints; squared residuals."""
         N, S = goals.shape[:2]
         rows = self.with_values(goals.reshape(-1, *goals.shape[2:]), values.reshape(-1, self.arm.n))

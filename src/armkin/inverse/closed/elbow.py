@@ -65,12 +65,12 @@ class Elbow:
             b = arrays.combine(n[0], [y], -n[1], [x])[0]
             right = arrays.sub(along + arrays.dot(n, o), arrays.mul(n[2], z))
             first, doubt1 = linear(a, b, right, 0, self.scale, prefer[0])
-        rx, ry, _ = self._seen(first, [x, y, z])
+        rx, ry, _ = self._in_frame_of_joint2(first, [x, y, z])
         rx, ry = arrays.sub(rx, past[0]), arrays.sub(ry, past[1])
         second, third, doubt23 = self.two_link.solve(rx, ry, prefer[1], prefer[2], fore)
         return [first, second, third], doubt1 | doubt23
 
-    def _seen(self, first: Pair, p: list[Entry]) -> list[Entry]:
+    def _in_frame_of_joint2(self, first: Pair, p: list[Entry]) -> list[Entry]:
         """A point p, seen from before joint 1, as joint 2's frame sees it."""
         moved = [p[0], p[1], p[2] - first.c] if first.s is None else spin(first.c, -first.s, p)
         lever = [arrays.sub(v, o) for v, o in zip(moved, self.shoulder[9:12], strict=True)]
@@ -80,7 +80,7 @@ class Elbow:
         """Squared distance of the tip from p: joint 2's frame sees p pulled back and the tip pushed there."""
         first, second, third = pairs
         before = pose.apply(self.from_base, p)
-        x, y, z = self._seen(first, before)
+        x, y, z = self._in_frame_of_joint2(first, before)
         total = (z - self.along) ** 2
         if first.s is not None:
             # a pair that is off the unit circle has stretched p on its way

@@ -54,29 +54,29 @@ class NewtonSteps:
         # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
         self.absent = None if self.counted or arm.prismatic.any() else ABSENT * distance
 
-    def corrected(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
+    def correct_seeds(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
         """Seeds moved onto the arm, and which of them are in doubt.
 
         Where the roots are counted, all four must be there, each apart from the others; else those that may be real.
         """
         point = goal[: self.size] if self.base is None else pose.apply(self.base, goal[:3])
-        pairs, first = self._turned(seeds.pairs, 1.0), None
+        pairs, first = self._turn_links(seeds.pairs, 1.0), None
         for _ in range(self.steps):
             missing, columns = self._linear(pairs, point)
             adjugate, det = _adjugate(columns)
             inverse = det / (det * det + tol.NO_DETERMINANT)
-            pairs = self._moved(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
+            pairs = self._take_step(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
             first = missing if first is None else first
         assert first is not None
         miss = arrays.dot(missing := self._linear(pairs, point)[0], missing)
         solving = miss < precision().nearby
         left: Truth = miss >= precision().nearby
-        pairs = self._turned(pairs, -1.0)
+        pairs = self._turn_links(pairs, -1.0)
         if self.absent is not None:
             left = left & (arrays.dot(first, first) < self.absent)
         return Candidates(pairs, seeds.doubt | (_merged_branches(pairs, self.unit) & solving) | left, miss)
 
-    def _turned(self, pairs: list[Pair], sense: float) -> list[Pair]:
+    def _turn_links(self, pairs: list[Pair], sense: float) -> list[Pair]:
         """Joints as the links without their turns have them, or with sense -1 back."""
         joints = zip(pairs, self.offset, strict=True)
         return [pair if pair.s is None else added_angles(pair, offset, sense) for pair, offset in joints]
@@ -107,7 +107,7 @@ class NewtonSteps:
             columns.append([arrays.mul(scale, v) for v in column[: self.size]])
         return [arrays.mul(scale, arrays.sub(w, v)) for w, v in zip(point, p, strict=False)], columns
 
-    def _moved(self, pairs: list[Pair], step: list[Entry]) -> list[Pair]:
+    def _take_step(self, pairs: list[Pair], step: list[Entry]) -> list[Pair]:
         """Joints after a step of the first ones [rad, reaches]; the others turn by as much, so that their sums stay.
 
         A turn by ``2 atan(t / 2)`` instead of t needs no sine; the difference is of the third power.
@@ -168,7 +168,7 @@ def corrected_form(arm: Arm, task: Task, distance: float, seeds: ClosedForm) -> 
     if len(last) and (abs(np.linalg.det(last)) < 0.5 or not set(np.unique(np.linalg.solve(last, task.sums))) <= SENSES):
         return None  # sums without the last joints, or of parts of turns
     newton = NewtonSteps(arm, task, distance)
-    return (lambda goal, prefer: newton.corrected(seeds(goal, prefer), goal)), newton.counted
+    return (lambda goal, prefer: newton.correct_seeds(seeds(goal, prefer), goal)), newton.counted
 
 
 def _merged_branches(pairs: list[Pair], unit: list[float]) -> Truth:

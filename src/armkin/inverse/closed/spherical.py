@@ -96,13 +96,13 @@ class SphericalWrist:
             miss = self.elbow.miss(pairs, centre)
             x, z = (pose.turn_back(self.links[3], self.elbow.turned_back(pairs, v)) for v in columns)
         else:
-            miss, x, z = self._pushed(pairs, centre, columns)
+            miss, x, z = self._carried_forward(pairs, centre, columns)
         turned, wrist_angles, doubt456, wrong = self.wrist.solve(x, z, prefer[3:])
         miss = arrays.mul(1.0 / self.reach**2, miss) + wrong
         angles = wrist_angles and [None, None, None, *wrist_angles]
         return Candidates([*pairs, *turned], doubt | doubt456, miss, angles)
 
-    def _pushed(
+    def _carried_forward(
         self, pairs: list[Pair], centre: list[Entry], columns: list[list[Entry]]
     ) -> tuple[Entry, list[Entry], list[Entry]]:
         """Squared distance of the wrist's centre from where it should be, and directions seen after joint 3."""

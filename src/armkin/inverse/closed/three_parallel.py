@@ -134,20 +134,20 @@ class ThreeParallel:
         # joint 4's frame seen from joint 2
         X = pose.compose(pose.rotate(D, sixth.c, -sixth.s), self.back5)
         X = pose.compose(pose.rotate(X, c5, -s5), self.back4)
-        p = pose.apply(self.to_joint2, _unrotate(c1, s1, X[9:12]))
-        x = pose.turn_direction(self.to_joint2, _unrotate(c1, s1, X[0:3]))
+        p = pose.apply(self.to_joint2, _turned_back(c1, s1, X[9:12]))
+        x = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[0:3]))
         pairs, angles, doubt23 = self.three_link.solve(p, x, prefer[1:4])
         doubt = doubt1 | doubt5 | doubt6 | doubt23
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
         across, height = self.three_link.miss(pairs, p)
-        along = pose.turn_direction(self.to_joint2, _unrotate(c1, s1, X[6:9]))
+        along = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
         aside = height * scale + distance2(along, [0.0, 0.0, self.three_link.sense4])
         miss = across * scale + aside
         return Candidates([first, *pairs, fifth, sixth], doubt, miss, [None, *angles, None, None])
 
 
-def _unrotate(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:
+def _turned_back(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:
     """``Rz(-q) v``."""
     return [c * v[0] + s * v[1], c * v[1] - s * v[0], v[2]]

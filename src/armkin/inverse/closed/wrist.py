@@ -62,17 +62,17 @@ class Wrist:
         """The joints that turn the first and the last column to x and z, both ways on branch axis 2; their angles where
         no inverse function is needed; doubt; and the squared distance that they leave of these columns."""
         if self.mirrored:
-            return self._mirrored(x, z, prefer)
+            return self._solve_mirrored(x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         thresholds = precision()
         tangent = (
             thresholds.sharp if self.orthogonal else thresholds.tangent
         )  # of an oblique wrist both roots merge whole
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, tangent)
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        fourth, sixth, doubt4, wrong = self._turn_about_middle(fifth, x, z, disc, prefer)
         return [fourth, fifth, sixth], [], doubt5 | doubt4, wrong
 
-    def _around(
+    def _turn_about_middle(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
     ) -> tuple[Pair, Pair, Doubt, Entry]:
         """Joints 4 and 6 for a joint 5, doubt, and how far the wrist's columns are from x and z.
@@ -89,13 +89,13 @@ class Wrist:
         wrong = distance2(spin(c4, s4, u), z) + out_of_plane * out_of_plane
         return fourth, Pair(c6, s6), doubt4, wrong
 
-    def _mirrored(
+    def _solve_mirrored(
         self, x: list[Entry], z: list[Entry], prefer: Prefer
     ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
         """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
         disc = z[0] * z[0] + z[1] * z[1]
         fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, arrays.sqrt(disc)))
-        fourth, sixth, doubt4, wrong = self._around(fifth, x, z, disc, prefer)
+        fourth, sixth, doubt4, wrong = self._turn_about_middle(fifth, x, z, disc, prefer)
         sign = signs(2)
         flipped = 0.5 - 0.5 * sign
         q4, q6 = (arrays.arctan2(s, c) for c, s in (fourth, sixth))

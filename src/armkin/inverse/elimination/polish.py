@@ -31,18 +31,18 @@ class Polished(NamedTuple):
 
 def turn(frame: Array, q: Array, prismatic: bool) -> Array:
     """``frame @ Z(q)`` for blocks (3, 4, M) and joint values (M,)."""
-    return _moved(frame, q, np.cos(q), _signed(np.sin(q)), prismatic)
+    return _moved_frame(frame, q, np.cos(q), _with_both_signs(np.sin(q)), prismatic)
 
 
-def _signed(sine: Array) -> Array:
-    """Sines (..., M) as `_moved` takes them: with both signs, (..., 2, M)."""
+def _with_both_signs(sine: Array) -> Array:
+    """Sines (..., M) as `_moved_frame` takes them: with both signs, (..., 2, M)."""
     both_signs = np.empty((*sine.shape[:-1], 2, sine.shape[-1]))
     both_signs[..., 0, :] = sine
     np.negative(sine, out=both_signs[..., 1, :])
     return both_signs
 
 
-def _moved(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
+def _moved_frame(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
     """`turn` by angles of which the cosines (M,) and the sines with both signs (2, M) are known."""
     moved = np.empty_like(frame)
     if prismatic:
@@ -62,12 +62,12 @@ def advance(frame: Array, link: Array) -> Array:
 
 def tip(link: Array, prismatic: Bool, q: Array) -> tuple[Array, Array]:
     """The last frame (3, 4, M) for joint values (n, M), and every joint's frame before it turns, (n, 3, 4, M)."""
-    cosine, sine = np.cos(q), _signed(np.sin(q))
+    cosine, sine = np.cos(q), _with_both_signs(np.sin(q))
     joints = np.empty((q.shape[0], 3, 4, q.shape[1]))
     frame = np.repeat(link[0, :3, :, None], q.shape[1], axis=2)
     for i in range(q.shape[0]):
         joints[i] = frame
-        frame = advance(_moved(frame, q[i], cosine[i], sine[i], bool(prismatic[i])), link[i + 1])
+        frame = advance(_moved_frame(frame, q[i], cosine[i], sine[i], bool(prismatic[i])), link[i + 1])
     return frame, joints
 
 

@@ -29,7 +29,7 @@ class _Ends:
     def __init__(self, follower: Follower, row: Int, branch: Int, of_limits: bool) -> None:
         self.follower, self.row, self.branch, self.of_limits = follower, row, branch, of_limits
 
-    def rooms(self, ends: Int, value: Array) -> Array:
+    def room_at(self, ends: Int, value: Array) -> Array:
         """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
         not there.
 
@@ -38,7 +38,7 @@ class _Ends:
         row, branch = self.row[ends], self.branch[ends]
         if self.of_limits:
             return margin(self.follower.arm, self.follower.own(row, branch, value))
-        q = self.follower.found(row, value)
+        q = self.follower.branches_at(row, value)
         *_, apart = nearest_other(q, branch)
         return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, apart))
 
@@ -66,7 +66,7 @@ class _Ends:
             going, guess, inside = going[left], guess[left], inside[left]
             if not len(going):
                 break
-            room = self.rooms(going, guess)
+            room = self.room_at(going, guess)
             left = ~(np.abs(room) < tol.NO_ROOM)
             going, guess, inside, room = going[left], guess[left], inside[left], room[left]
             better = room > 0
@@ -103,7 +103,7 @@ def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Change
 
     def depth(value: Array) -> Array:
         """Below zero: such a stretch."""
-        return sign * rows.rooms(every, value)
+        return sign * rows.room_at(every, value)
 
     begin, end = value_at(t, row, k), value_at(t, row, k + 1)
     _, _, peak, least = golden_section(depth, begin, end, PEAK)
@@ -141,7 +141,7 @@ def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Arra
         value[leaders] = ends.between(good[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
         rows = np.flatnonzero(~joined & np.isin(first, leaders))
         value[rows] = value[first[rows]]
-        q = follower.found(
+        q = follower.branches_at(
             changes.row[rows], value[rows] + np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
         )
         away, _, apart = nearest_other(q, changes.branch[rows])

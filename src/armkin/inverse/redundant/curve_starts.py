@@ -83,7 +83,7 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
     row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
     source = follower._replace(free=guide)
     if guide is follower.free:
-        q = follower.found(row, t)
+        q = follower.branches_at(row, t)
         solving, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
         q, missed = source.candidates(row, t)

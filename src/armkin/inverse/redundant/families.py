@@ -76,7 +76,7 @@ def families(
         for curves in [Followed.along(follower)] if free.by_formula else trace_families(follower):
             rows.add(curves)
     rows.add_points(task, goal, not free.by_formula)
-    q, interval, legal, branch = rows.stacked()
+    q, interval, legal, branch = rows.stack_parts()
     valid = branch >= 0
     status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
     names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
@@ -155,7 +155,7 @@ class _Rows:
         near = self.near[begin + pieces.row]
         q = _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
-            q = curves.settled(pieces, q)
+            q = curves.settle(pieces, q)
         standing = np.flatnonzero(self.stands[begin + pieces.row])
         q[standing] = _with_near(self.arm, self.joint, rows_of(pieces, standing), q[standing], near[standing])
         if self.arm.keep_out:
@@ -188,7 +188,7 @@ class _Rows:
                 value = np.full((1, 2), q[best, self.joint])
                 self.parts.append((np.array([k]), q[[best]], value, legal[[best]], np.zeros(1, np.intp)))
 
-    def stacked(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
+    def stack_parts(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
         """q (N, B, n), intervals (N, B, 2), whether legal and the branch (N, B), -1 where there is no row."""
         N, n = self.near.shape
         row = np.concatenate([np.zeros(0, np.intp), *(part[0] for part in self.parts)])
@@ -225,7 +225,7 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     if not len(rows):
         return best
     if isinstance(curves, Followed):  # of others these are samples
-        for t in curves.tried(rows_of(curves.pieces, rows), near[rows]):
+        for t in curves.values_to_try(rows_of(curves.pieces, rows), near[rows]):
             costs(rows, t)
     # beside a kink or a limit the motion grows on both sides: it is the nearest posture
     p = rows_of(curves.pieces, rows)

@@ -48,7 +48,7 @@ class Followed(NamedTuple):
             parts.append(pieces._replace(row=rows[pieces.row]))
         return cls(follower, stack_rows(parts), short, complete)
 
-    def tried(self, pieces: Pieces, near: Array) -> list[Array]:
+    def values_to_try(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
         near has the joint, and beside that sample."""
         value = near[:, self.follower.free.joint]
@@ -57,7 +57,7 @@ class Followed(NamedTuple):
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
-        return self.follower.one(pieces.row, pieces.branch, parameter)
+        return self.follower.legal_branch(pieces.row, pieces.branch, parameter)
 
 
 def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
@@ -117,7 +117,7 @@ def _all_pieces(follower: Follower, shown: Summary) -> Pieces:
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
         middle = 0.5 * (a + b)
-        q, legal = follower.one(row, branch, middle)
+        q, legal = follower.legal_branch(row, branch, middle)
         parts.append(rows_of(Pieces(row, branch, legal, a, b, a, b, a, middle, b, q), legal))
     return stack_rows(parts)
 
@@ -152,7 +152,7 @@ def _without_gaps(follower: Follower, pieces: Pieces, gaps: Changes, ends: Array
                 holds = (a <= piece.at) & (piece.at <= b)
                 centre = np.where(holds, piece.at, 0.5 * (a + b))
                 low, high = (np.clip(piece.low, a, b), np.clip(piece.high, a, b)) if holds else (a, b)
-                start, _ = follower.one(piece.row, piece.branch, centre)
+                start, _ = follower.legal_branch(piece.row, piece.branch, centre)
                 parts.append(piece._replace(a=a, b=b, first=a, last=b, low=low, at=centre, high=high, start=start))
             pieces = stack_rows(parts)
             break

@@ -92,7 +92,7 @@ class Follower(NamedTuple):
         """For some of the targets."""
         return self._replace(target=self.target[rows], near=self.near[rows])
 
-    def found(self, rows: Int, t: Array) -> Array:
+    def branches_at(self, rows: Int, t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
         where there is none."""
         if not self.free.by_formula:
@@ -128,7 +128,7 @@ class Follower(NamedTuple):
         values.insert(self.free.joint, t)
         return [*values, miss, room]
 
-    def sampled(self, pick: Int, t: Array, more: Array | None = None) -> Sampled:
+    def samples_at(self, pick: Int, t: Array, more: Array | None = None) -> Sampled:
         """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
         rows, values = np.repeat(pick, len(t)), np.tile(t, len(pick))
@@ -169,7 +169,7 @@ class Follower(NamedTuple):
         return Sampled(t, columns, axes, *dense)
 
     def own(self, rows: Int, branch: Int, t: Array) -> Array:
-        """One branch each (M, n), as `found`."""
+        """One branch each (M, n), as `branches_at`."""
         *columns, miss, _ = self._candidates(rows, t, [])
         place = np.unravel_index(branch, _recorded_form(self.arm, self.free)[1])
 
@@ -182,7 +182,7 @@ class Follower(NamedTuple):
         q[~(picked(miss) <= tol.ACCEPTED**2)] = np.nan
         return q
 
-    def one(self, rows: Int, branch: Int, t: Array) -> tuple[Array, Bool]:
+    def legal_branch(self, rows: Int, branch: Int, t: Array) -> tuple[Array, Bool]:
         """One branch each (M, n), at its nearest legal copy, nan where there is none; which are within limits (M,)."""
         postures = self.own(rows, branch, t)
         present = ~np.isnan(postures[:, 0])

@@ -107,9 +107,9 @@ def summary_of_samples(follower: Follower, t: Array, places: Array | None = None
     at_once = max(AT_A_TIME // len(t), 1)
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
     if places is None:
-        return stack_rows([_summarise(follower.sampled(rows, t), rows, False) for rows in parts])
+        return stack_rows([_summarise(follower.samples_at(rows, t), rows, False) for rows in parts])
     more = on_both_sides(places)
-    return stack_rows([_summarise(follower.sampled(rows, t, more[rows]), rows, True) for rows in parts])
+    return stack_rows([_summarise(follower.samples_at(rows, t, more[rows]), rows, True) for rows in parts])
 
 
 def place_between(t: Array, changes: Changes, places: Array) -> Array:

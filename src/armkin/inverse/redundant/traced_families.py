@@ -87,7 +87,7 @@ class Traced(NamedTuple):
         q, legal = nearest_row(self.follower.arm, points.q, self.follower.near[pieces.row])
         return q, legal & (points.step < tol.REACH)
 
-    def settled(self, pieces: Pieces, q: Array) -> Array:
+    def settle(self, pieces: Pieces, q: Array) -> Array:
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
         follower, q = self.follower, q.copy()
         for _ in range(LAST):
@@ -203,7 +203,7 @@ class _Nodes(NamedTuple):
         cost = motion(curves.follower.arm, q, near)
         costs = np.concatenate([cost[node], np.where(fits, cost, np.inf)[node]])
         best = best_samples(costs, curve + len(row) * legal, first, length + 1)
-        a, b = _ends(self.q[node, curves.follower.free.joint], curve, first, length)
+        a, b = _ends_of_pieces(self.q[node, curves.follower.free.joint], curve, first, length)
 
         def parameter(sample: Int) -> Array:
             return np.asarray(value[curve, sample % K] + curves.counts[curve] * (sample // K))
@@ -240,7 +240,7 @@ class _Nodes(NamedTuple):
         return curve, first, length, np.arange(len(curve)) < len(of_legal[0])
 
 
-def _ends(value: Array, curve: Int, first: Int, length: Int) -> tuple[Array, Array]:
+def _ends_of_pieces(value: Array, curve: Int, first: Int, length: Int) -> tuple[Array, Array]:
     """The least and the largest value of a joint along runs (R,) of curves' nodes, at which it has values (C, K)."""
     change = np.cumsum(np.tile(wrap_angle(np.roll(value, -1, axis=1) - value), 2), axis=1)
     change = np.concatenate([np.zeros((len(value), 1)), change], axis=1)

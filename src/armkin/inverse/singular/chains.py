@@ -11,14 +11,14 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.local_structure import Structure, leaves, members, stretch
+from armkin.inverse.singular.local_structure import Structure, leave_spans, members, stretch
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
 LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 
 
-def whole(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
+def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
     """Which postures peers (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
     Those on which the residual grows, and those that leave a shortened span, are followed both ways until they end, or
@@ -36,7 +36,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: A
         return inside, ended, ended & at.alone, at.joints
     joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
     curve, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
-    start, ahead = leaves(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
+    start, ahead = leave_spans(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
     finished = np.isnan(start[:, 0])
     going = np.flatnonzero(~finished)
     for _ in range(LINKS):
@@ -56,7 +56,7 @@ def whole(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: A
         np.maximum.at(most, row[good], (shift + link.most)[good])
         np.logical_and.at(alone, row[good], link.alone[good])
         np.logical_or.at(at.boundary, row[good], link.boundary[good])
-        onto, onwards = leaves(arm, link, rows, last, way)
+        onto, onwards = leave_spans(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = onto[good], onwards[good]
         finished[going] = good & (home | np.isnan(onto[:, 0]))
         going = going[~finished[going] & (link.second > tol.HIGH)]

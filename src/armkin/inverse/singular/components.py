@@ -170,11 +170,11 @@ class _Groups:
         if single.any():
             i, c = k[single], b[single]
             local = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
-            along, self.ended[i, c], self.alone[i, c], joints = chains.whole(arm, task, local, q[i, c], q[i], target[i])
+            same, self.ended[i, c], self.alone[i, c], joints = chains.follow(arm, task, local, q[i, c], q[i], target[i])
             self.known[i, c], self.moves[i, c], self.which[i, c] = local.known, local.manifold, joints
             self.edge[i, c] = local.boundary
             self.place[i, c] = np.where(local.known, len(self.component) + np.arange(len(i)), 0)
-            self.component = np.concatenate([self.component, along])
+            self.component = np.concatenate([self.component, same])
         self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
@@ -275,7 +275,7 @@ class _Groups:
             mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
         return np.asarray(mine)
 
-    def settled(self, missed: Bool, beyond: Bool) -> Examined:
+    def settle(self, missed: Bool, beyond: Bool) -> Examined:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
         small = self.valid.shape[1] <= FEW
@@ -361,4 +361,4 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
             sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     candidates = _Candidates(q, label, size, sure, simple)
-    return _Groups(goals, candidates, lost, rests).settled(np.asarray(missed), np.asarray(all_beyond))
+    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(all_beyond))

@@ -75,7 +75,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     """
     M, n = q.shape
     linear = known or newton.Linear.at(arm, task, q, target)
-    (r, U, S, V), curve = linear, _undecided(linear)
+    (r, U, S, V), curve = linear, _structure_of_jacobians(linear)
     rows = r.shape[1]
     if rows < n:
         return curve
@@ -101,13 +101,13 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
     """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
     linear = newton.Linear.at(arm, task, q, target)
-    curve = _undecided(linear)
+    curve = _structure_of_jacobians(linear)
     curve.span[...] = span
     curve.known[...] = _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))
     return curve
 
 
-def _undecided(linear: newton.Linear) -> Structure:
+def _structure_of_jacobians(linear: newton.Linear) -> Structure:
     """What Jacobians alone tell of their M postures."""
     r, _, S, V = linear
     M, n = len(r), V.shape[2]
@@ -120,7 +120,7 @@ def _undecided(linear: newton.Linear) -> Structure:
     return Structure(known, manifold, boundary, joints, *ends, alone, v, second, x, g)
 
 
-def leaves(arm: Arm, structure: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:
+def leave_spans(arm: Arm, structure: Structure, rows: Int, q: Array, ahead: Array) -> tuple[Array, Array]:
     """Where curves through q (m, n), those of rows (m,), leave their spans, and the way there, (m, n).
 
     ahead: (m, n) which way they are followed. nan where a curve comes to an end before.
