@@ -227,7 +227,7 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
         sample_counts.append(len(s))
         return solved(self, s, examine)
 
-    monkeypatch.setattr(Samples, "solved", counted)
+    monkeypatch.setattr(Samples, "solve_at", counted)
     moves: dict[str, object] = {"start": "home", "moves": [{"offset": {"xyz": way}}]}
     arm = with_rates("stanford")
     if carried:
