@@ -225,11 +225,9 @@ class Position:
             return third, Pair(d, None), doubt | doubt2
         # d2 = (known_0 - rows_0 . y) / z0, affine in b, put into the distance
         d2 = [arrays.mul(1.0 / z0, v) for v in across[0]]
-        constant = [
-            arrays.add(arrays.sub(h, a), arrays.mul(z1, d)) for h, a, d in zip(half, across[1], d2, strict=True)
-        ]
+        fixed = [arrays.add(arrays.sub(h, a), arrays.mul(z1, d)) for h, a, d in zip(half, across[1], d2, strict=True)]
         factor = [arrays.add(arrays.mul(0.5, d), float(y)) for d, y in zip(d2, self.Y[2], strict=True)]
-        six = quadratics.total([*constant, curved, 0.0, 0.0], quadratics.product(d2, factor))
+        six = quadratics.total([*fixed, curved, 0.0, 0.0], quadratics.product(d2, factor))
         if self.prismatic[2]:
             d, doubt = sub.quadratic(six[3], six[1], six[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
             third = Pair(d, None)

@@ -115,9 +115,8 @@ class ThreeParallel:
         w = pose.turn_back(D, turned)
         disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
         thresholds = precision()
-        tangent = (
-            thresholds.sharp if self.orthogonal else thresholds.tangent
-        )  # of an oblique wrist both roots merge whole
+        # of an oblique wrist both roots merge whole
+        tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
         fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
         c5, s5 = fifth
         mx, my, mz = self.m

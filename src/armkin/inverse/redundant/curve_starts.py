@@ -130,11 +130,9 @@ def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]
     close = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
-    pairs = np.flatnonzero(close)
+    twin = np.flatnonzero(close)
     unique = np.ones(len(q), bool)
-    unique[second[pairs[newton.wrapped_distance(follower.arm, q[first[pairs]], q[second[pairs]]) < tol.SAME_SEED]]] = (
-        False
-    )
+    unique[second[twin[newton.wrapped_distance(follower.arm, q[first[twin]], q[second[twin]]) < tol.SAME_SEED]]] = False
     return unique
 
 

@@ -30,10 +30,8 @@ class Box(NamedTuple):
 
 def box_of(arm: Arm) -> Box:
     """The limits of an arm, inf where a joint has a whole turn or more."""
-    turns = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
-    return Box(
-        np.where(turns, -np.inf, arm.lower), np.where(turns, np.inf, arm.upper), np.asarray(radian_or_reach(arm))
-    )
+    wide = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
+    return Box(np.where(wide, -np.inf, arm.lower), np.where(wide, np.inf, arm.upper), np.asarray(radian_or_reach(arm)))
 
 
 class _Local(NamedTuple):

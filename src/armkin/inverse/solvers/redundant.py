@@ -4,6 +4,7 @@ that are held."""
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
@@ -62,13 +63,10 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
         return redundancy(arm, task.name)  # the same rest, prepared once
     options = []
     for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
-        if arm.prismatic[joint]:
-            continue
-        rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
-        try:
-            options.append(Redundancy(joint, rest_arm, task, solver(rest_arm, task.name)[1]))
-        except UsageError:
-            continue
+        if not arm.prismatic[joint]:
+            rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
+            with suppress(UsageError):
+                options.append(Redundancy(joint, rest_arm, task, solver(rest_arm, task.name)[1]))
     closed = [option for option in options if option.geometry.pairs is not None]
     return next(iter(closed or options[:1]), None)
 
