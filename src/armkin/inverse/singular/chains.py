@@ -22,8 +22,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     """Which postures peers (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
 
     Those on which the residual grows, and those that leave a shortened span, are followed both ways until they end, or
-    close: then `at` tells of the latter, too. Also on which of these (M,) no other curve crosses, and the joints (M, n)
-    that move.
+    close, the latter at most as far as tells that they are manifolds: then `at` tells of them, too. Also on which of
+    these (M,) no other curve crosses, and the joints (M, n) that move.
     """
     rows = np.arange(len(q))
     open_ = ~at.known & at.followed
@@ -59,7 +59,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         onto, onwards = leave_spans(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = onto[good], onwards[good]
         finished[going] = good & (home | np.isnan(onto[:, 0]))
-        going = going[~finished[going] & (link.second > tol.HIGH)]
+        enough = ~at.known & ((most - least).max(axis=1) >= tol.REACH)
+        going = going[~(finished[going] | enough[row]) & (link.second > tol.HIGH)]
     extent, ended[left] = (most - least)[left], finished.reshape(2, -1).all(axis=0)
     at.manifold[left] = extent.max(axis=1) >= tol.REACH
     at.known[left], at.boundary[left] = at.manifold[left] | ended[left], at.boundary[left] & ~at.manifold[left]
