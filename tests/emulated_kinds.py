@@ -34,17 +34,17 @@ def emulate_grbl(board: Board, sim: Any, hal: bool = False) -> Emulated:
         sim.step = 0.01
     base, boot = [0, 0, 0], sim.boot
 
-    def booted(*, power: bool = True) -> None:
+    def boot_and_shift(*, power: bool = True) -> None:
         if power:
             base[:] = [a + b for a, b in zip(base, sim.steps[:3], strict=True)]
         boot(power=power)
 
-    sim.boot = booted
+    sim.boot = boot_and_shift
     return Emulated(
         board,
         sim,
         lambda: [a + b for a, b in zip(base, sim.steps[:3], strict=True)],
-        reset=booted,
+        reset=boot_and_shift,
         foreign=[partial(sim.write, data) for data in GRBL],
     )
 

@@ -150,11 +150,11 @@ def watch_counts(arm: armkin.Arm, kind: str, port: Any, seen: list[list[float]])
 
     advance = sim.advance
 
-    def noted(seconds: float) -> None:
+    def note_and_call(seconds: float) -> None:
         advance(seconds)
         seen.append(pins())
 
-    sim.advance = noted
+    sim.advance = note_and_call
 
 
 @dataclass(frozen=True)

@@ -25,12 +25,12 @@ def test_long_words_take_no_long_time(text: str, tmp_path: Path) -> None:
     robot = tmp_path / "arm.yaml"
     robot.write_text((ROOT / "robots/three_dof.yaml").read_text().replace("d: 170", f"d: {text}"))
 
-    def tried() -> None:
+    def run_both() -> None:
         assert run("fk", "three_dof", text, 0, 0).code == 2
         assert run("info", robot).code == 4
         assert run("fk", "three_dof", "--batch", "-", stdin=f"{text},0,0\n".encode()).code == 2
 
-    assert least_seconds(tried, 1.5) < 1.5
+    assert least_seconds(run_both, 1.5) < 1.5
 
 
 def test_copies_of_a_branch_are_counted_before_they_are_made(tmp_path: Path) -> None:

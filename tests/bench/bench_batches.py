@@ -67,13 +67,13 @@ def c_alone(fast: Any, T: np.ndarray) -> float:
     inner, spent = fast._library_for(None), [0.0]
     call = inner._batch
 
-    def timed(*arguments: Any) -> int:
+    def time_call(*arguments: Any) -> int:
         start = time.process_time()
         answered = int(call(*arguments))
         spent[0] += time.process_time() - start
         return answered
 
-    inner._batch = timed
+    inner._batch = time_call
     fast.ik(T)
     inner._batch = call
     return spent[0]

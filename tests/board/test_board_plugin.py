@@ -35,7 +35,7 @@ def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def plugin_installed(packages: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """The package is installed here."""
     monkeypatch.syspath_prepend(str(packages))
     board_catalogue._entry_points.cache_clear()
@@ -76,7 +76,7 @@ def test_a_kind_that_is_not_installed_is_named_with_those_that_are(tmp_path: Pat
         armkin.load(robots(tmp_path)[1])
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("plugin_installed")
 def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
     for file in robots(tmp_path):
         arm = armkin.load(file)
@@ -97,7 +97,7 @@ def test_both_arms_move_exactly_and_keep_to_their_path(tmp_path: Path) -> None:
             )  # a degree off the straight joint move
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("plugin_installed")
 def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     arm = armkin.load(robots(tmp_path)[1])
     board, port = connect_emulated(arm, lost=0.01, damaged=0.01)
@@ -113,7 +113,7 @@ def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     assert np.abs(distance).max() <= 12
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("plugin_installed")
 def test_the_servos_own_limits_zero_and_relax(tmp_path: Path) -> None:
     arm = armkin.load(robots(tmp_path)[1])
     board = board_of(arm)
@@ -133,7 +133,7 @@ def test_the_servos_own_limits_zero_and_relax(tmp_path: Path) -> None:
     assert board.zero(None) == ([2100, 2048, 2048, 2048, 2048, 2048], None)
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("plugin_installed")
 def test_the_command_line_tells_of_it(tmp_path: Path) -> None:
     robot = robots(tmp_path)[1]
     status = run("status", robot, "--port", "sim")
@@ -143,7 +143,7 @@ def test_the_command_line_tells_of_it(tmp_path: Path) -> None:
     assert '"dynamixel"' in run("schema").out
 
 
-@pytest.mark.usefixtures("installed")
+@pytest.mark.usefixtures("plugin_installed")
 @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
 def test_it_conforms(case: Callable[..., None]) -> None:
     run_sample(case, "dynamixel")

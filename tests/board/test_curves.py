@@ -65,12 +65,12 @@ def test_a_board_that_is_sent_positions_slows_down_gently_on_curves() -> None:
     circle = armkin.path(arm, {"start": {"point": [350, 0, 300]}, "moves": [{"circle": {"centre": [300, 0, 300]}}]})
     t = np.linspace(0.0, circle.duration, 500)
 
-    def asked(ramp: float) -> float:
+    def greatest_share(ramp: float) -> float:
         slower = circle.motion.qdd(t) - circle.motion.qd(t) / ramp
         return float((np.abs(slower) / arm.max_accel).max())
 
     ramp = braking_time(circle.motion)
-    assert asked(ramp) <= 1.63 < asked(0.625 * ramp)
+    assert greatest_share(ramp) <= 1.63 < greatest_share(0.625 * ramp)
     plan = armkin.path(arm, {"moves": [{"joint": {"q1": 60}}]})
     assert braking_time(plan.motion) == pytest.approx(0.5)  # 60 deg/s at 120 deg/s2
 
@@ -100,11 +100,11 @@ def test_chords_that_may_be_long_are_told_without_a_look(seed: int, monkeypatch:
     looked: list[int] = []
     counts = armkin.pulses(arm, plan.motion.start)
 
-    def counted(arm: armkin.Arm, q: Array) -> Array:
+    def count_and_call(arm: armkin.Arm, q: Array) -> Array:
         looked.append(len(q))
         return armkin.jacobian(arm, q)
 
-    monkeypatch.setattr(curve_segments, "jacobian", counted)
+    monkeypatch.setattr(curve_segments, "jacobian", count_and_call)
 
     def bounds(arm: armkin.Arm) -> list[float]:
         ways = [s for s in plan.motion.stretches if isinstance(s, Curve)]

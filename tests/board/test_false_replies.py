@@ -124,7 +124,7 @@ COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
 
 
 @pytest.fixture(scope="module")
-def switched() -> Arm:
+def arm_with_switches() -> Arm:
     """With a limit switch on every joint, beside its home pose."""
     text = Path("robots/three_dof.yaml").read_text()
     for axis, switch_value in zip("XYZ", (-20, 75, -105), strict=True):
@@ -134,14 +134,14 @@ def switched() -> Arm:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_lies_to_a_moving_command_end_it_in_bounded_time(switched: Arm, command: str) -> None:
+def test_lies_to_a_moving_command_end_it_in_bounded_time(arm_with_switches: Arm, command: str) -> None:
     """Never an internal error, never without an end; with success only where the command cannot know better."""
     believed = []
     for lie in LIES if LONG else LIES[:: 5 if command == "send" else 8]:
-        configuration = configure(switched)
-        port = LyingPort(homing.switch_levels(switched, configuration), **lie)
-        machine = FirmwareMachine(port, switched, configuration)
-        machine.prepare(assume=switched.home)
+        configuration = configure(arm_with_switches)
+        port = LyingPort(homing.switch_levels(arm_with_switches, configuration), **lie)
+        machine = FirmwareMachine(port, arm_with_switches, configuration)
+        machine.prepare(assume=arm_with_switches.home)
         gripping.prepare_gripper(machine, gripping.gripper_of("arm", configuration), 833)
         port.lying = True
         begin = port.now()

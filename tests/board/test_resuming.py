@@ -153,25 +153,25 @@ def test_a_motion_held_in_its_approach_goes_on_with_that(arm: Arm, tmp_path: Pat
 def test_what_cannot_be_gone_on_with_is_refused_with_the_next_step(
     arm: Arm, motions: dict[str, tuple[object, ...]]
 ) -> None:
-    def refused(code: int, pattern: str, *words: object) -> None:
+    def assert_refused(code: int, pattern: str, *words: object) -> None:
         before = arm.counts
         exit_code, err = arm.send(*words, "--resume")
         assert (exit_code, arm.counts) == (code, before), err
         assert re.search(pattern, err), err
 
-    refused(5, "position is lost.*\n?.*--assume-home", *motions["single"])
+    assert_refused(5, "position is lost.*\n?.*--assume-home", *motions["single"])
     assert arm.send(0, 90, -90, "--assume-home")[0] == 0
-    refused(2, "no motion was held.*\n?.*leave --resume out", *motions["single"])
+    assert_refused(2, "no motion was held.*\n?.*leave --resume out", *motions["single"])
     arm.paused_at = 0.8
     assert arm.send(*motions["single"])[0] == 5
-    refused(2, "another motion than the one that was held", 20, 80, -80)
-    refused(2, "--resume and --dry-run", *motions["single"], "--dry-run")
-    refused(2, "--resume and --assume", *motions["single"], "--assume-home")
-    refused(2, "--resume needs the same rows again.*\n.*give a file with the rows, --batch FILE", "--batch", "-")
+    assert_refused(2, "another motion than the one that was held", 20, 80, -80)
+    assert_refused(2, "--resume and --dry-run", *motions["single"], "--dry-run")
+    assert_refused(2, "--resume and --assume", *motions["single"], "--assume-home")
+    assert_refused(2, "--resume needs the same rows again.*\n.*give a file with the rows, --batch FILE", "--batch", "-")
     assert run("jog", THREE_DOF, "q1", 10, "--seconds", 0.3, "--port", arm.name).code == 0
-    refused(5, "the arm has moved since", *motions["single"])
+    assert_refused(5, "the arm has moved since", *motions["single"])
     assert arm.send(*motions["single"])[0] == 0
-    refused(2, "no motion was held", *motions["single"])  # it has arrived
+    assert_refused(2, "no motion was held", *motions["single"])  # it has arrived
 
 
 def test_a_sender_that_was_killed_leaves_a_note_that_is_enough(
@@ -197,12 +197,12 @@ def _kill_sender(monkeypatch: pytest.MonkeyPatch, is_time: Callable[[], bool]) -
     """The sender ends without a word once `is_time` says so."""
     read = Wire.read
 
-    def deadly(self: Wire, timeout: float) -> bytes:
+    def read_or_die(self: Wire, timeout: float) -> bytes:
         if is_time():
             raise KeyboardInterrupt
         return read(self, timeout)
 
-    monkeypatch.setattr(Wire, "read", deadly)
+    monkeypatch.setattr(Wire, "read", read_or_die)
 
 
 def test_a_stop_says_where_the_arm_stands_and_that_it_can_go_on(

@@ -309,7 +309,7 @@ def test_a_move_of_hours_is_planned_at_once_in_bounded_memory() -> None:
     """Two million degrees: 9 hours, of which 47 s and 313 MB went into segments that nothing was waiting for."""
     arm = replace(arms.load_arm("robots/three_dof.yaml"), lower=np.full(3, -np.inf), upper=np.full(3, np.inf))
 
-    def planned() -> None:
+    def plan_move() -> None:
         made = plan_moves(arm, [0, 0, 0], np.deg2rad([2e6, 90, -90]))
         number = made.segments
         [move] = made.moves()
@@ -317,6 +317,6 @@ def test_a_move_of_hours_is_planned_at_once_in_bounded_memory() -> None:
         assert sum(1 for _ in itertools.islice(move.segments, 2000)) == 2000
 
     tracemalloc.start()
-    assert least_seconds(planned, 5) < 5
+    assert least_seconds(plan_move, 5) < 5
     assert tracemalloc.get_traced_memory()[1] < 5e6
     tracemalloc.stop()

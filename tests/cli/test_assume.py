@@ -10,7 +10,7 @@ from command_line import ROOT, THREE_DOF, run
 
 
 @pytest.fixture
-def parked(tmp_path: Path) -> Path:
+def parked_robot(tmp_path: Path) -> Path:
     robot = tmp_path / "parked.yaml"
     robot.write_text((ROOT / THREE_DOF).read_text() + "poses: {park: [10, 70, -60]}\n")
     return robot
@@ -27,10 +27,10 @@ def parked(tmp_path: Path) -> Path:
 )
 @pytest.mark.parametrize("command", ["send", "path"])
 def test_an_arm_stands_where_it_is_said_to(
-    words: tuple[str, ...], stands: list[float], command: str, parked: Path
+    words: tuple[str, ...], stands: list[float], command: str, parked_robot: Path
 ) -> None:
     goal = ("home",) if command == "send" else ("--via", "390,80,300", "--via", "390,100,300")
-    completed = run(command, parked, *goal, "--port", "sim", *words, "--json")
+    completed = run(command, parked_robot, *goal, "--port", "sim", *words, "--json")
     assert completed.code == 0, completed.err
     began = completed.json["start_joints"] if command == "send" else None
     assert "the board takes the arm to stand" in completed.err
@@ -46,8 +46,8 @@ def test_an_arm_stands_where_it_is_said_to(
         (("--assume", "0,300,0"), 3, "--assume: q2 = 300 deg is outside"),
     ],
 )
-def test_a_place_that_is_none_is_refused(words: tuple[str, ...], code: int, message: str, parked: Path) -> None:
-    completed = run("send", parked, "home", "--port", "sim", *words)
+def test_a_place_that_is_none_is_refused(words: tuple[str, ...], code: int, message: str, parked_robot: Path) -> None:
+    completed = run("send", parked_robot, "home", "--port", "sim", *words)
     assert (completed.code, completed.out) == (code, "")
     assert message in completed.err
 

@@ -83,14 +83,14 @@ def test_before_the_first_move_a_joint_jogs_slowly_and_never_by_more_than_two_de
     jogs: list[tuple[float, float]] = []
     jog = FirmwareBoard.jog
 
-    def noted(board: FirmwareBoard, joint: int, rate: float, seconds: float, more: Callable[[], bool]) -> None:
+    def note_and_call(board: FirmwareBoard, joint: int, rate: float, seconds: float, more: Callable[[], bool]) -> None:
         before = float(board.machine.joints()[joint])
         jog(board, joint, rate, seconds, more)
         board.machine.refresh()
         moved = float(board.machine.joints()[joint]) - before
         jogs.append((abs(rate) / float(board.arm.max_speed[joint]), moved))
 
-    monkeypatch.setattr(FirmwareBoard, "jog", noted)
+    monkeypatch.setattr(FirmwareBoard, "jog", note_and_call)
     first = ["+", "+", "-", "-", ENTER, "a", "+", "-", ENTER, "y"]
     completed, person, _ = begin(
         "three_dof", [*first, *keys_for_direction("s"), *keys_for_direction("s"), "y", ENTER, "s"]

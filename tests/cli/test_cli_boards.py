@@ -141,7 +141,7 @@ ENDS = {"q1": (1, 120), "q2": (-1, -20), "q3": (1, 120)}
 
 
 @pytest.fixture
-def homed(grbl: str) -> str:
+def grbl_with_switches(grbl: str) -> str:
     """The GRBL arm with a switch on every joint, and a gripper on M3."""
     text = Path(grbl).read_text()
     for name, (direction, switch_value) in ENDS.items():
@@ -160,47 +160,49 @@ def grbl_for(robot: str, **more: float) -> Grbl:
     )
 
 
-def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(homed: str) -> None:
-    rehearsed = run("home", homed, "--port", "sim", "--json")
+def test_home_ends_in_the_home_pose_and_stays_at_the_switches_when_told(grbl_with_switches: str) -> None:
+    rehearsed = run("home", grbl_with_switches, "--port", "sim", "--json")
     assert rehearsed.json["joints"] == pytest.approx([0, 90, -90], abs=0.03)
     assert "moving to the home pose" in rehearsed.err
-    board = grbl_for(homed)
+    board = grbl_for(grbl_with_switches)
     with PtyPort(board) as pty:
-        at_switches = run("home", homed, "--port", pty.name, "--stay", "--json").json
+        at_switches = run("home", grbl_with_switches, "--port", pty.name, "--stay", "--json").json
         assert at_switches["joints"] == pytest.approx([119, -19, 119], abs=0.03)  # $27 = 1 deg off the switches
         steps_before = board.steps[:3]
-        home = run("home", homed, "--port", pty.name, "--json").json
+        home = run("home", grbl_with_switches, "--port", pty.name, "--json").json
         assert (home["position"], home["pulses"]) == ("known", [0, 0, 0])
         assert [a - b for a, b in zip(board.steps, steps_before, strict=True)] == [-n for n in at_switches["pulses"]]
 
 
-def test_home_refuses_a_board_that_would_look_at_the_other_end(homed: str) -> None:
-    board = grbl_for(homed, s23=0)
+def test_home_refuses_a_board_that_would_look_at_the_other_end(grbl_with_switches: str) -> None:
+    board = grbl_for(grbl_with_switches, s23=0)
     with PtyPort(board) as pty:
-        refused = run("home", homed, "--port", pty.name)
+        refused = run("home", grbl_with_switches, "--port", pty.name)
         assert (refused.code, board.steps) == (5, [0, 0, 0])
         assert "would not home as three_dof_grbl needs: $23 (homing downwards) is 0" in refused.err
-        assert run("send", homed, 0, 89, -89, "--port", pty.name, "--assume-home").code == 0  # no matter to a move
-        assert run("setup", homed, "--port", pty.name, "--write").code == 0
-        assert run("home", homed, "--port", pty.name).code == 0
+        assert (
+            run("send", grbl_with_switches, 0, 89, -89, "--port", pty.name, "--assume-home").code == 0
+        )  # no matter to a move
+        assert run("setup", grbl_with_switches, "--port", pty.name, "--write").code == 0
+        assert run("home", grbl_with_switches, "--port", pty.name).code == 0
 
 
-def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(homed: str) -> None:
-    board = grbl_for(homed)
+def test_a_gripper_on_m3_is_given_its_word_and_told_to_be_unmeasured(grbl_with_switches: str) -> None:
+    board = grbl_for(grbl_with_switches)
     with PtyPort(board) as pty:
-        completed = run("grip", homed, "closed", "--port", pty.name, "--json")
+        completed = run("grip", grbl_with_switches, "closed", "--port", pty.name, "--json")
         assert (board.spindle, completed.json["gripper"], completed.json["measured"]) == (200, 200, False)
-        assert "S, as sent: nothing measures it" in run("grip", homed, "open", "--port", pty.name).out
+        assert "S, as sent: nothing measures it" in run("grip", grbl_with_switches, "open", "--port", pty.name).out
         assert board.spindle == 40
-        assert "outside of the gripper's 40 to 200" in run("grip", homed, 201, "--port", pty.name).err
+        assert "outside of the gripper's 40 to 200" in run("grip", grbl_with_switches, 201, "--port", pty.name).err
         board.settings[30] = 100
-        refused = run("grip", homed, "closed", "--port", pty.name)
+        refused = run("grip", grbl_with_switches, "closed", "--port", pty.name)
         assert (refused.code, board.spindle) == (5, 40)
         assert "does not give out S 200: $30 is 100" in refused.err
 
 
-def test_a_spindle_is_for_grbl_s_gripper_alone(homed: str, tmp_path: Path) -> None:
-    text, path = Path(homed).read_text(), tmp_path / "wrong.yaml"
+def test_a_spindle_is_for_grbl_s_gripper_alone(grbl_with_switches: str, tmp_path: Path) -> None:
+    text, path = Path(grbl_with_switches).read_text(), tmp_path / "wrong.yaml"
     for before, after, says in (
         ("kind: spindle, open: 40", "kind: spindle, axis: X, open: 40", "a spindle has none"),
         ("closed: 200", "closed: -200", "is an S word of M3"),
@@ -233,17 +235,17 @@ def test_values_are_replaced_where_they_stand() -> None:
     assert replaced == "a:\n  - {b: 10, c: [2, 3], z: 11}  # one\n  - b: 4\n    d: 12\n    z: 13\ne: 14\n"
 
 
-def test_a_path_grips_with_grbl_s_output_between_its_moves(homed: str, tmp_path: Path) -> None:
+def test_a_path_grips_with_grbl_s_output_between_its_moves(grbl_with_switches: str, tmp_path: Path) -> None:
     """What the board cannot reach is refused before anything moves."""
     path, wide = tmp_path / "path.yaml", tmp_path / "wide.yaml"
     path.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: closed\n  - joint: [0, 90, -90]\n")
     wide.write_text("moves:\n  - joint: [3, 85, -85]\n  - grip: 999\n")
-    board = grbl_for(homed)
+    board = grbl_for(grbl_with_switches)
     with PtyPort(board) as pty:
-        refused = run("path", homed, wide, "--port", pty.name, "--assume-home")
+        refused = run("path", grbl_with_switches, wide, "--port", pty.name, "--assume-home")
         assert (refused.code, board.steps[:3]) == (2, [0, 0, 0])
         assert "outside of the gripper's 40 to 200" in refused.err
-        completed = run("path", homed, path, "--port", pty.name, "--json")
+        completed = run("path", grbl_with_switches, path, "--port", pty.name, "--json")
         assert completed.code == 0, completed.err
         assert (board.spindle, completed.json["pulses"]) == (200, [0, 0, 0])
 

@@ -16,20 +16,20 @@ def targets_of(q: np.ndarray) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def winding() -> np.ndarray:
+def winding_path() -> np.ndarray:
     """A path on which the last joint turns through 340 degrees, far from home."""
     share = np.linspace(0, 1, 60)[:, None]
     begin = np.array([40.0, -70.0, 80.0, -100.0, -80.0, 5.0])
     return np.asarray(begin + share * np.array([60.0, 20.0, -30.0, 15.0, 20.0, 340.0]))
 
 
-def test_rows_follow_each_other_where_a_fixed_pose_makes_them_jump(winding: np.ndarray) -> None:
-    start = ",".join(map(str, winding[0]))
-    rows = targets_of(winding)
+def test_rows_follow_each_other_where_a_fixed_pose_makes_them_jump(winding_path: np.ndarray) -> None:
+    start = ",".join(map(str, winding_path[0]))
+    rows = targets_of(winding_path)
     follows = run("ik", "ur5e", "--batch", "-", "--continuous", "--near", start, "--json", stdin=rows).lines
     joints = np.array([line["branches"][line["best"]]["joints"] for line in follows])
-    assert np.allclose(joints, winding, atol=1e-6)
-    assert follows[0]["near"] == winding[0].tolist()
+    assert np.allclose(joints, winding_path, atol=1e-6)
+    assert follows[0]["near"] == winding_path[0].tolist()
     assert follows[7]["near"] == joints[6].tolist()
     assert follows[7]["branches"][0]["motion"] == pytest.approx(np.abs(joints[7] - joints[6]).sum())
     fixed = run("ik", "ur5e", "--batch", "-", "--near", start, "--json", stdin=rows).lines
@@ -37,9 +37,9 @@ def test_rows_follow_each_other_where_a_fixed_pose_makes_them_jump(winding: np.n
     assert np.abs(jumps).max() > 90
 
 
-def test_the_same_across_chunks_and_unreachable_rows(winding: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
-    start = ",".join(map(str, winding[0]))
-    lines = targets_of(winding).splitlines()
+def test_the_same_across_chunks_and_unreachable_rows(winding_path: np.ndarray, monkeypatch: pytest.MonkeyPatch) -> None:
+    start = ",".join(map(str, winding_path[0]))
+    lines = targets_of(winding_path).splitlines()
     lines.insert(30, b"9000,0,0,0,0,0")
     words = ("ik", "ur5e", "--batch", "-", "--continuous", "--near", start)
     in_one_chunk = run(*words, "--json", stdin=b"\n".join(lines))
@@ -48,7 +48,7 @@ def test_the_same_across_chunks_and_unreachable_rows(winding: np.ndarray, monkey
     assert in_one_chunk.code == parts.code == 3
     assert [line["best"] for line in parts.lines] == [line["best"] for line in in_one_chunk.lines]
     joints = [line["branches"][0]["joints"] for line in parts.lines if line["best"] is not None]
-    assert np.allclose(joints, winding, atol=1e-6)
+    assert np.allclose(joints, winding_path, atol=1e-6)
 
 
 def test_all_branches_lock_and_branch_go_with_it() -> None:

@@ -14,7 +14,7 @@ MADE_WITH = ("robot_file", "robot_sha256", "tool", "seconds")
 
 
 @pytest.fixture
-def other(tmp_path: Path) -> Path:
+def robot_with_tool(tmp_path: Path) -> Path:
     """puma560 with that tool in its file."""
     document = yaml.safe_load((ROOT / "robots" / "puma560.yaml").read_text())
     path = tmp_path / "puma560.yaml"
@@ -37,10 +37,10 @@ def _without_tool_keys(answer: dict[str, Any]) -> dict[str, Any]:
     ],
     ids=lambda words: words[0],
 )
-def test_answers_are_those_of_a_file_with_that_tool(words: tuple[str, ...], other: Path) -> None:
+def test_answers_are_those_of_a_file_with_that_tool(words: tuple[str, ...], robot_with_tool: Path) -> None:
     command, *arguments = words
     completed = run(command, "puma560", *arguments, GIVEN, "--json")
-    want = run(command, other, *arguments, "--json")
+    want = run(command, robot_with_tool, *arguments, "--json")
     assert completed.code == want.code == 0, completed.err + want.err
     assert completed.json["tool"] == TOOL
     assert "tool" not in want.json

@@ -171,13 +171,13 @@ def stop_after(pieces: int, monkeypatch: pytest.MonkeyPatch, error: BaseExceptio
     answered: list[int] = []
     work = batch_answers.answer_piece
 
-    def counted(job: Any, piece: Any) -> Any:
+    def count_and_call(job: Any, piece: Any) -> Any:
         if len(answered) == pieces:
             raise error
         answered.append(piece.number)
         return work(job, piece)
 
-    monkeypatch.setattr(batch_answers, "answer_piece", counted)
+    monkeypatch.setattr(batch_answers, "answer_piece", count_and_call)
     return answered
 
 

@@ -16,11 +16,11 @@ def left_to_python(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     counts: list[int] = []
     answered = solve.solve_by
 
-    def counted(
+    def count_and_call(
         arm: armkin.Arm, task: Any, geometry: Any, targets: np.ndarray, *others_given: Any, **named: Any
     ) -> armkin.Solutions:
         counts.append(len(targets))
         return answered(arm, task, geometry, targets, *others_given, **named)
 
-    monkeypatch.setattr(solve, "solve_by", counted)
+    monkeypatch.setattr(solve, "solve_by", count_and_call)
     return counts

@@ -380,11 +380,11 @@ def test_targets_on_an_edge_are_eliminated_in_c(monkeypatch: pytest.MonkeyPatch)
     python, fast = armkin.ik(arm, target), armkin.compile(arm)
     solve, eliminated = method.solve, []
 
-    def counted(elimination: method.Elimination, T: np.ndarray, *more: Any) -> method.Branches:
+    def count_and_call(elimination: method.Elimination, T: np.ndarray, *more: Any) -> method.Branches:
         eliminated.append(len(T))
         return solve(elimination, T, *more)
 
-    monkeypatch.setattr(method, "solve", counted)
+    monkeypatch.setattr(method, "solve", count_and_call)
     left = left_to_python(monkeypatch)
     solutions = fast.ik(target)
     assert sum(left) > 5

@@ -16,11 +16,11 @@ def watch_loading(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     contents: list[str] = []
     load = toolchain.load_library
 
-    def counted(source: str, content: str, level: int = 3) -> object:
+    def count_and_call(source: str, content: str, level: int = 3) -> object:
         contents.append(content)
         return load(source, content, level)
 
-    monkeypatch.setattr(toolchain, "load_library", counted)
+    monkeypatch.setattr(toolchain, "load_library", count_and_call)
     compiled_arm._compiled_arm.cache_clear()
     return contents
 

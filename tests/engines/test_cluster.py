@@ -28,7 +28,7 @@ from killing_chunks import square_or_die
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[cluster_kills.Cluster]:
+def cluster_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[cluster_kills.Cluster]:
     """A scheduler with two worker processes, whose nanny starts another for one that is killed."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.fspath(ROOT / "tests"))  # where the work is
@@ -38,9 +38,9 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[cluster_kills.Cl
 
 
 @pytest.fixture
-def address(whole: cluster_kills.Cluster) -> str:
+def address(cluster_processes: cluster_kills.Cluster) -> str:
     """The scheduler's; one that was killed has a successor."""
-    return whole.address
+    return cluster_processes.address
 
 
 @pytest.mark.parametrize("engine_kind", ["cluster", "pool"])
@@ -115,7 +115,7 @@ def test_a_workspace_is_the_same_bytes_wherever_it_is_sampled(
 
 
 @pytest.fixture(scope="module")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+def undisturbed_batch(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A batch's input, and the digest of its answers."""
     folder = tmp_path_factory.mktemp("undisturbed")
     source, target = folder / "in.csv", folder / "one.csv"
@@ -126,12 +126,12 @@ def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 
 @pytest.mark.parametrize("victim", ["worker", "client", "scheduler"])
 def test_a_kill_costs_at_most_the_chunks_in_hand(
-    victim: str, whole: cluster_kills.Cluster, undisturbed: tuple[Path, str], tmp_path: Path
+    victim: str, cluster_processes: cluster_kills.Cluster, undisturbed_batch: tuple[Path, str], tmp_path: Path
 ) -> None:
     """One of each here; twenty of each: tests/bench/bench_kills.py."""
-    source, expected = undisturbed
+    source, expected = undisturbed_batch
     disturbed = cluster_kills.disturb_batch(
-        source, tmp_path / "two.csv", expected, victim, whole, Random(len(victim)), count=3
+        source, tmp_path / "two.csv", expected, victim, cluster_processes, Random(len(victim)), count=3
     )
     assert disturbed.same, disturbed
     assert disturbed.redone == 0

@@ -121,7 +121,7 @@ def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -
     interval = round(CLOCK / rate / ticks)
     ends = interval - ticks // 2, interval + ticks // 2
 
-    def changing(number: int, counts: tuple[int, ...]) -> Segment:
+    def changing_segment(number: int, counts: tuple[int, ...]) -> Segment:
         """One cycle a tick longer or shorter."""
         return whole_steps(ticks, ends[number % 2], 256 * (1 - 2 * (number % 2)), counts)
 
@@ -134,7 +134,9 @@ def segments_per_second(baud: int, rate: float, board: str = "uno_cnc_shield") -
         steps = [(3 + i % 2, -3, 2 - i % 2, -1) for i in range(count)]
         steps += [(3, -2, 2, -1), (2, -1, 1, -1), (1, -1, 1, -1)]
         # a pause in front, so that the queue is full when it matters
-        work = [whole_steps(100, 9600, 0, (0, 0, 0, 0))] + [changing(i, counts) for i, counts in enumerate(steps)]
+        work = [whole_steps(100, 9600, 0, (0, 0, 0, 0))] + [
+            changing_segment(i, counts) for i, counts in enumerate(steps)
+        ]
         plan = cut_batches((0, 1, 2, 3), (0, 0, 0, 0), work, batch)
         status = host.stream(plan, slice_s=0.25e-3, bytes_ahead=300)  # more than it promises, but it keeps up
         x = emulated.stats()["axes"]["X"]

@@ -31,13 +31,13 @@ def send_path_from(board: EmulatedBoard, folder: Path, moves: dict[str, Any], pl
     assert placed.code == 0, placed.err
     before, begin = net_steps(board), 0
 
-    def noted(*words: object) -> Any:
+    def note_and_call(*words: object) -> Any:
         """The same command, where the motors stand before it: a busy machine may have held the arm on its way."""
         nonlocal before, begin
         before, begin = net_steps(board), board.control("cycles")["cycle"]
         return run(*words)
 
-    completed = run_patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=noted)
+    completed = run_patiently("path", THREE_DOF, file, "--port", board.port, "--json", run=note_and_call)
     if completed.code == 3:
         assert net_steps(board) == before
         raise NoSolutionError(completed.err.strip())

@@ -120,13 +120,13 @@ def test_a_crash_is_told(programs: Path) -> None:
 def test_nothing_is_left_behind_when_a_test_fails(probe: Path) -> None:
     board = stepped_board(probe)
 
-    def failing() -> None:
+    def fail_with_board() -> None:
         with board:
             assert board.stats()["state"] == "running"
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        failing()
+        fail_with_board()
     assert not Path(board.port).parent.exists()
     with pytest.raises(BoardError, match="not running"):
         board.control("cycles")

@@ -19,7 +19,7 @@ Make = Callable[[str], EmulatedBoard]
 
 
 @pytest.fixture(scope="session")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def built_images(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Images as scripts/release makes them."""
     folder = tmp_path_factory.mktemp("images")
     for kind in KINDS:
@@ -50,15 +50,15 @@ def loaders(optiboot: Path) -> dict[str, Path]:
 
 
 @pytest.fixture
-def empty(loaders: dict[str, Path]) -> Make:
+def empty_board(loaders: dict[str, Path]) -> Make:
     """A board of some kind with nothing but its boot loader."""
     return lambda kind: EmulatedBoard(kind, loader=loaders[BOARDS[kind].chip], speed="max")
 
 
 @pytest.fixture(autouse=True)
-def _installed(built: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.flash.firmware_images.FOLDER", built)
-    monkeypatch.setattr(firmware_images.image, "__defaults__", (built,))
+def _images_installed(built_images: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("armkin.flash.firmware_images.FOLDER", built_images)
+    monkeypatch.setattr(firmware_images.image, "__defaults__", (built_images,))
 
 
 @pytest.fixture
@@ -68,10 +68,12 @@ def without_avrdude(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("uploader", ["armkin", "avrdude"])
-def test_an_empty_board_runs_armkin(kind: str, uploader: str, empty: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_empty_board_runs_armkin(
+    kind: str, uploader: str, empty_board: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if uploader == "armkin":
         monkeypatch.setattr("armkin.flash.avrdude.find_avrdude", lambda: None)
-    with empty(kind) as board:
+    with empty_board(kind) as board:
         completed = run("flash", "--board", kind, "--port", board.port, "--json")
         assert completed.code == 0, completed.err
         answer = completed.json
@@ -83,9 +85,9 @@ def test_an_empty_board_runs_armkin(kind: str, uploader: str, empty: Make, monke
 
 
 @pytest.mark.usefixtures("without_avrdude")
-def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make) -> None:
+def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty_board: Make) -> None:
     command = ("flash", "--board", "uno_cnc_shield", "--port")
-    with empty("uno_cnc_shield") as board:
+    with empty_board("uno_cnc_shield") as board:
         board.control("after 1s cut both")
         completed = run(*command, board.port)
         assert completed.code == 5
@@ -96,9 +98,9 @@ def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty: Make
 
 
 @pytest.mark.parametrize(("named", "plugged_in"), [KINDS, KINDS[::-1]])
-def test_another_board_than_was_named_keeps_its_program(named: str, plugged_in: str, empty: Make) -> None:
+def test_another_board_than_was_named_keeps_its_program(named: str, plugged_in: str, empty_board: Make) -> None:
     chip = BOARDS[plugged_in].chip
-    with empty(plugged_in) as board:
+    with empty_board(plugged_in) as board:
         completed = run("flash", "--board", named, "--port", board.port)
         assert completed.code == 5
         assert f"the chip on {board.port} is an {chip}" in completed.err
@@ -106,10 +108,10 @@ def test_another_board_than_was_named_keeps_its_program(named: str, plugged_in: 
         assert board.stats()["uart"]["received"] < 200
 
 
-def test_a_port_that_another_program_holds_is_not_reset(empty: Make) -> None:
+def test_a_port_that_another_program_holds_is_not_reset(empty_board: Make) -> None:
     from armkin.board.ports import SerialPort
 
-    with empty("uno_cnc_shield") as board:
+    with empty_board("uno_cnc_shield") as board:
         held = SerialPort(board.port)
         resets = board.stats()["resets"]
         completed = run("flash", "--board", "uno_cnc_shield", "--port", board.port)

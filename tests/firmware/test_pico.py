@@ -64,12 +64,12 @@ def test_the_uf2_file_is_what_a_pico_takes() -> None:
         assert end == 0x0AB16F30
         flash += data[:256]
 
-    def mirrored(x: int, bits: int) -> int:
+    def mirror_bits(x: int, bits: int) -> int:
         return int(f"{x:0{bits}b}"[::-1], 2)
 
     # The boot ROM's CRC-32 is zlib's, but with all bits mirrored and not inverted at the end.
-    reflected = zlib.crc32(bytes(mirrored(byte, 8) for byte in flash[:252])) ^ 0xFFFFFFFF
-    assert struct.unpack("<I", flash[252:256])[0] == mirrored(reflected, 32)
+    reflected = zlib.crc32(bytes(mirror_bits(byte, 8) for byte in flash[:252])) ^ 0xFFFFFFFF
+    assert struct.unpack("<I", flash[252:256])[0] == mirror_bits(reflected, 32)
     stack, start = struct.unpack("<II", flash[256:264])
     assert stack == 0x2004_0000
     assert start & 1

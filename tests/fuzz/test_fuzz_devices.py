@@ -109,7 +109,7 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
     rng = random_generator(robot.rpartition("/")[2])
     boards: list[Port] = []
 
-    def opened(*words_given: object, **options: object) -> Port:
+    def open_fuzzed(*words_given: object, **options: object) -> Port:
         if not boards or rng.random() < 0.4:  # else the one of the command before, as that has left it
             boards[:] = [BOARDS_OF[robot](rng)]
         return Unreliable(boards[0], rng)
@@ -117,7 +117,7 @@ def test_any_device(robot: str, rounds: int, tmp_path: Path, monkeypatch: pytest
     # our firmware's; boards of others, and stop; Klipper's
     places = "kinds.firmware.SerialPort", "backend.board.SerialPort", "ports.SerialPort", "kinds.klipper.SocketPort"
     for port in places:
-        monkeypatch.setattr(f"armkin.board.{port}", opened)
+        monkeypatch.setattr(f"armkin.board.{port}", open_fuzzed)
     # The same in every run: no notes of other runs, no random session numbers, no leads for a busy computer.
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     monkeypatch.setattr(session, "secrets", Numbers(rng))

@@ -66,11 +66,11 @@ def test_steps_are_not_spent_on_complex_roots_that_stand_for_nothing(monkeypatch
     arm, missed = armkin.load("niryo_ned2"), []
     armkin.method(arm)
 
-    def watched(*arguments: Any, **more: Any) -> polish.Polished:
+    def watch_and_call(*arguments: Any, **more: Any) -> polish.Polished:
         refined = polish.refine(*arguments, **more)
         missed.append(int((refined.guess > 1.0).sum()))
         return refined
 
-    monkeypatch.setattr(passes, "refine", watched)
+    monkeypatch.setattr(passes, "refine", watch_and_call)
     armkin.ik(arm, armkin.fk(arm, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6))), examine=False)
     assert 0 < missed[0] < 300

@@ -22,19 +22,19 @@ def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.Mon
     settled = []
     settle = linkages.settle
 
-    def kept(*arguments: object) -> linkages.Linkages:
+    def keep_settled(*arguments: object) -> linkages.Linkages:
         settled.append(settle(*arguments))  # type: ignore[arg-type]
         return settled[-1]
 
-    def nothing(goals: object, *arguments: object) -> linkages.Linkages:
+    def settle_nothing(goals: object, *arguments: object) -> linkages.Linkages:
         settled_one = settle(goals, *arguments)  # type: ignore[arg-type]
         none = np.zeros_like(settled_one.known)
         return settled_one._replace(known=none, lacking=none)
 
-    monkeypatch.setattr(linkages, "settle", kept)
+    monkeypatch.setattr(linkages, "settle", keep_settled)
     fast = armkin.ik(arm, T, near=near)
     assert sum(settled_one.known.sum() for settled_one in settled) > 7
-    monkeypatch.setattr(linkages, "settle", nothing)
+    monkeypatch.setattr(linkages, "settle", settle_nothing)
     slow = armkin.ik(arm, T, near=near)
     np.testing.assert_array_equal(fast.status, slow.status)
     np.testing.assert_array_equal(fast.free, slow.free)

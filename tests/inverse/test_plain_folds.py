@@ -95,13 +95,13 @@ def test_what_two_jacobians_tell_is_what_examining_finds(
     q[110:, 1:] = rng.integers(-4, 4, (10, arm.n - 1)) * np.pi / 4
     target = np.asarray(targets_of(chosen_task, armkin.fk(arm, q), q))
 
-    def counted(*arguments: Any) -> Any:
+    def count_and_call(*arguments: Any) -> Any:
         nonlocal told_count
         left = tell(*arguments)
         told_count += len(arguments[3].rows) - len(left)
         return left
 
-    monkeypatch.setattr(chunks, "decide_folds", counted)
+    monkeypatch.setattr(chunks, "decide_folds", count_and_call)
     short = armkin.ik(arm, target, task)
     monkeypatch.setattr(chunks, "decide_folds", lambda goals, runner, out, at: at.rows)
     long = armkin.ik(arm, target, task)

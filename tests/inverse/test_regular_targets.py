@@ -60,11 +60,11 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     doubtful_counts = []
     examine = components.examine
 
-    def counted(goals: Goals, *more: Any) -> Examined:
+    def count_and_call(goals: Goals, *more: Any) -> Examined:
         doubtful_counts.append(len(goals.target))
         return examine(goals, *more)
 
-    monkeypatch.setattr(components, "examine", counted)
+    monkeypatch.setattr(components, "examine", count_and_call)
     arm, _ = shipped_arm(name)
     task, _ = solver(arm, None)
     screw = shipped_arm(name)[1]

@@ -21,12 +21,12 @@ def entered_functions(arm: armkin.Arm, T: np.ndarray) -> set[tuple[str, str]]:
     armkin.ik(arm, T)
     functions: set[tuple[str, str]] = set()
 
-    def called(frame: FrameType, event: str, _: object) -> None:
+    def note_call(frame: FrameType, event: str, _: object) -> None:
         code = frame.f_code
         if event == "call" and code.co_filename.startswith(ROOM) and not code.co_name.startswith("<"):
             functions.add((code.co_filename, code.co_qualname))
 
-    sys.setprofile(called)
+    sys.setprofile(note_call)
     try:
         armkin.ik(arm, T)
     finally:

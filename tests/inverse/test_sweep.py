@@ -51,11 +51,11 @@ def test_branches_kept_do_not_grow_with_the_values(monkeypatch: pytest.MonkeyPat
     counts: list[int] = []
     add = choose_branch._SweptTarget.add
 
-    def noted(collected: choose_branch._SweptTarget, *arguments: Any) -> None:
+    def note_and_call(collected: choose_branch._SweptTarget, *arguments: Any) -> None:
         add(collected, *arguments)
         counts.append(len(collected.branches))
 
-    monkeypatch.setattr(choose_branch._SweptTarget, "add", noted)
+    monkeypatch.setattr(choose_branch._SweptTarget, "add", note_and_call)
     request = replace(SWEPT, swept={"q1": [0.0, 10.0, 20.0, 30.0, 40.0] * 40})
     [*_, most] = sorted(answer.total for answer in choose_branch.solve(request, TARGETS[:6]))
     assert most > 60

@@ -212,11 +212,11 @@ def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) ->
     examined: list[int] = []
     examine = components.examine
 
-    def counted(goals: Goals, *arguments: object) -> object:
+    def count_and_call(goals: Goals, *arguments: object) -> object:
         examined.append(len(goals.target))
         return examine(goals, *arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(components, "examine", counted)
+    monkeypatch.setattr(components, "examine", count_and_call)
     arm = shipped_arm("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
     link = arm.link.copy()

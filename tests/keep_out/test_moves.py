@@ -75,11 +75,11 @@ def test_a_jog_of_coupled_motors_is_looked_at_as_whole_counts_make_it(
     arm = armkin.load("tests/robots/differential_wrist.yaml", scene=table)
     goals: list[Array] = []
 
-    def noted(arm: armkin.Arm, q: Array, goal: Array) -> tuple[float, None]:
+    def note_and_call(arm: armkin.Arm, q: Array, goal: Array) -> tuple[float, None]:
         goals.append(goal - q)
         return 1.0, None
 
-    monkeypatch.setattr(jogging, "free_way", noted)
+    monkeypatch.setattr(jogging, "free_way", note_and_call)
     configuration = SimpleNamespace(axes=range(7))
     machine: Any = SimpleNamespace(
         arm=arm, position=lambda: "known", joints=lambda: arm.home, configuration=configuration

@@ -73,13 +73,13 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
     joined = boundary_chains._join_chains
     count = 0
 
-    def counted(a: Chain, b: Chain) -> Chain:
+    def count_and_call(a: Chain, b: Chain) -> Chain:
         nonlocal count
         count += 1
         assert count <= 100
         return joined(a, b)
 
-    monkeypatch.setattr(boundary_chains, "_join_chains", counted)
+    monkeypatch.setattr(boundary_chains, "_join_chains", count_and_call)
     arm = arm_with_rates("mycobot_280")
     plan = armkin.path(arm, {"start": "home", "moves": [{"offset": {"xyz": [0, 0, -20]}}]})
     down = armkin.fk(arm, arm.home)[:3, 3] - np.array([0, 0, 20])

@@ -223,11 +223,11 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
     """From the Stanford arm's home: straight up joints 4 and 6 are free all along, and divided steps multiplied."""
     sample_counts, solved = [], Samples.solve_at
 
-    def counted(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
+    def count_and_call(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
         sample_counts.append(len(s))
         return solved(self, s, examine)
 
-    monkeypatch.setattr(Samples, "solve_at", counted)
+    monkeypatch.setattr(Samples, "solve_at", count_and_call)
     moves: dict[str, object] = {"start": "home", "moves": [{"offset": {"xyz": way}}]}
     arm = with_rates("stanford")
     if carried:
@@ -248,11 +248,11 @@ def test_an_ordinary_line_asks_once_how_straight_a_wrist_is(monkeypatch: pytest.
     """Joint 5 alone tells; the axes were asked anew for each branch of a line, which took up to 15 % of its time."""
     counts = []
 
-    def counted(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
+    def count_and_call(arm: armkin.Arm, q: np.ndarray) -> np.ndarray:
         counts.append(len(q))
         return armkin.jacobian(arm, q)
 
-    monkeypatch.setattr(wrist_turn, "jacobian", counted)
+    monkeypatch.setattr(wrist_turn, "jacobian", count_and_call)
     arm = with_rates("irb2400")
     ends = np.tile(armkin.fk(arm, [0.3, 0.3, 0.2, 0.5, 1.0, 0.3]), (2, 1, 1))
     ends[1, :3, 3] += [60.0, 60.0, 0.0]
@@ -267,11 +267,11 @@ def test_a_way_that_is_singular_throughout_has_one_place_where_its_wrist_is_stra
     place_counts: list[int] = []
     straight = wrist_turn._straight_samples
 
-    def counted(*arguments: Any) -> list[int]:
+    def count_and_call(*arguments: Any) -> list[int]:
         places = straight(*arguments)
         place_counts.append(len(places))
         return places
 
-    monkeypatch.setattr(wrist_turn, "_straight_samples", counted)
+    monkeypatch.setattr(wrist_turn, "_straight_samples", count_and_call)
     test_free_joints_stay_where_the_whole_way_is_singular("puma560")
     assert max(place_counts) == 1

@@ -296,11 +296,11 @@ def test_an_arc_without_radius_draws_nothing() -> None:
     """`G2 X0 Y0 I0 J0` where the tool stands: an internal error."""
     arm = armkin.load("three_dof")
 
-    def planned(text: str) -> float:
+    def plan_length(text: str) -> float:
         return armkin.path(
             arm, gcode.parse_gcode(text.encode(), "t.gcode", place_drawing(arm, [330, -10, 250]), DrawingOptions())
         ).length
 
     with pytest.raises(UsageError, match=r"t\.gcode:1: .*its points are all the same"):
-        planned("G0 X0 Y0\nG2 X0 Y0 I0 J0")
-    assert planned("G0 X0 Y0\nG2 X0 Y0 I0 J0\nG1 X5\nG2 X5 Y0 I0 J0\nG1 X9") == pytest.approx(9)
+        plan_length("G0 X0 Y0\nG2 X0 Y0 I0 J0")
+    assert plan_length("G0 X0 Y0\nG2 X0 Y0 I0 J0\nG1 X5\nG2 X5 Y0 I0 J0\nG1 X9") == pytest.approx(9)

@@ -31,7 +31,7 @@ POSE = np.deg2rad([-30, 5, -5])
 
 
 @pytest.fixture
-def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
+def saved_figures(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """The figures that were saved."""
     figures: list[Any] = []
     save = Figure.savefig
@@ -45,7 +45,7 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 
 @pytest.fixture(scope="module")
-def surveyed() -> Workspace:
+def survey_of_arm() -> Workspace:
     return workspace(THREE_DOF, 40_000, measures=["manipulability", "step_error"], keep=40_000)
 
 
@@ -93,13 +93,13 @@ def test_skeleton_of_a_slide() -> None:
     assert skeleton(SCARA, q).tip == pytest.approx(fk(SCARA, q)[:3, 3], abs=1e-9)
 
 
-def test_single_pose(tmp_path: Path, drawn: list[Any]) -> None:
+def test_single_pose(tmp_path: Path, saved_figures: list[Any]) -> None:
     picture = tmp_path / "arm.png"
     plot_poses(THREE_DOF, POSE, str(picture), title="three_dof")
     width, height = size_of_png(picture)
     assert width >= 1200
     assert height >= 800
-    [figure] = drawn
+    [figure] = saved_figures
     [axes] = figure.axes
     assert millimetres_per_millimetre(axes) == pytest.approx([1, 1, 1])
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()) == ("x / mm", "y / mm", "z / mm")
@@ -120,11 +120,11 @@ def test_single_pose(tmp_path: Path, drawn: list[Any]) -> None:
     assert box.y1 <= figure.bbox.height
 
 
-def test_all_branches_of_a_target(tmp_path: Path, drawn: list[Any]) -> None:
+def test_all_branches_of_a_target(tmp_path: Path, saved_figures: list[Any]) -> None:
     s = armkin.ik(THREE_DOF, [390.0, 80.0, 300.0])
     names = [s.names[k] for k in s.branch]
     plot_poses(THREE_DOF, s.q, str(tmp_path / "branches.png"), names=names, target=[390, 80, 300])
-    [figure] = drawn
+    [figure] = saved_figures
     legal = {name for name, is_legal in zip(names, s.within_limits, strict=True) if is_legal}
     assert legal == {"left, elbow up", "left, elbow down"}
     labels = [name if name in legal else f"{name} (outside limits)" for name in names]
@@ -136,10 +136,10 @@ def test_all_branches_of_a_target(tmp_path: Path, drawn: list[Any]) -> None:
     assert len({lines[label].get_color() for label in labels}) == 4
 
 
-def test_path(tmp_path: Path, drawn: list[Any]) -> None:
+def test_path(tmp_path: Path, saved_figures: list[Any]) -> None:
     poses = np.deg2rad([[a, 30 + a / 3, -40] for a in range(0, 70, 10)])
     plot_poses(THREE_DOF, poses, str(tmp_path / "path.svg"))
-    [figure] = drawn
+    [figure] = saved_figures
     assert [text for text in texts_of(figure) if text in ("start", "end")] == ["start", "end"]
     tips = fk(THREE_DOF, poses)[:, :3, 3]
     ways = [np.array(line.get_data_3d()).T for line in figure.axes[0].lines]
@@ -150,10 +150,10 @@ def test_path(tmp_path: Path, drawn: list[Any]) -> None:
     assert np.linalg.norm((tips[2] + tips[3]) / 2 - middle) > 1
 
 
-def test_a_long_path_shows_some_arms_and_the_whole_way(tmp_path: Path, drawn: list[Any]) -> None:
+def test_a_long_path_shows_some_arms_and_the_whole_way(tmp_path: Path, saved_figures: list[Any]) -> None:
     poses = np.deg2rad([[a / 10, 30 + a / 30, -40] for a in range(1000)])
     plot_poses(THREE_DOF, poses, str(tmp_path / "path.png"))
-    [figure] = drawn
+    [figure] = saved_figures
     arms = [line for line in figure.axes[0].lines if np.array(line.get_data_3d()).shape == (3, 5)]
     assert len(arms) == 40
     assert max(np.array(line.get_data_3d()).shape[1] for line in figure.axes[0].lines) > 10_000
@@ -173,24 +173,29 @@ def seen_boxes(figure: Any) -> tuple[Any, Any]:
 def test_nothing_of_a_shipped_robot_is_cut_off_or_covered(
     first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, sample: Callable[[int, int], int]
 ) -> None:
-    drawn: list[Any] = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(figure))  # the pixels take half of it
+    saved_figures: list[Any] = []
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, *_, **__: saved_figures.append(figure)
+    )  # the pixels take half of it
     for name in catalogue.robot_names()[first : first + sample(2, 1)]:
-        drawn.clear()
-        _is_seen_whole(armkin.load(name), tmp_path, drawn)
+        saved_figures.clear()
+        _is_seen_whole(armkin.load(name), tmp_path, saved_figures)
 
 
-def _is_seen_whole(arm: armkin.Arm, tmp_path: Path, drawn: list[Any]) -> None:
+def _is_seen_whole(arm: armkin.Arm, tmp_path: Path, saved_figures: list[Any]) -> None:
     plot_poses(arm, arm.home, str(tmp_path / "home.png"))
     near = arm.home + 0.2 * np.where(arm.prismatic, arm.reach, 1.0) * np.array([[1.0], [-1.0]])
     names = ["right, elbow down, flip", "left, elbow up, no flip"]
     plot_poses(arm, near, str(tmp_path / "branches.png"), names=names)
-    shown = [text.get_text() for axes in drawn[0].axes for text in axes.texts]
+    shown = [text.get_text() for axes in saved_figures[0].axes for text in axes.texts]
     assert set(" ".join(shown).replace(",", "").split()) >= set(arm.joint_names)
-    for figure in drawn:
+    for figure in saved_figures:
         if not hasattr(figure.axes[0], "get_zlim"):
             continue
-        assert (figure.axes[0].elev, figure.axes[0].azim) == (drawn[0].axes[0].elev, drawn[0].axes[0].azim)
+        assert (figure.axes[0].elev, figure.axes[0].azim) == (
+            saved_figures[0].axes[0].elev,
+            saved_figures[0].axes[0].azim,
+        )
         (low, high), legend = seen_boxes(figure)
         assert np.all(low >= 0)
         assert np.all(high <= figure.bbox.size)
@@ -199,13 +204,13 @@ def _is_seen_whole(arm: armkin.Arm, tmp_path: Path, drawn: list[Any]) -> None:
         assert all(len(marks) for marks in places)
 
 
-def test_twins_are_seen_beside_each_other(tmp_path: Path, drawn: list[Any]) -> None:
+def test_twins_are_seen_beside_each_other(tmp_path: Path, saved_figures: list[Any]) -> None:
     """A wrist flip leaves every corner of the arm where it is."""
     arm = armkin.load("puma560")
     s = armkin.ik(arm, fk(arm, [0.3, -0.5, 0.4, 0.5, 0.7, 0.2]), "pose")
     names = [s.names[k] for k in s.branch[s.valid]]
     plot_poses(arm, s.q[s.valid], str(tmp_path / "twins.png"), names=names)
-    lines = {line.get_label(): line.get_linewidth() for line in drawn[0].axes[0].lines}
+    lines = {line.get_label(): line.get_linewidth() for line in saved_figures[0].axes[0].lines}
     by_name = {name: width for label, width in lines.items() for name in names if str(label).startswith(name)}
     for name in names:
         if name.endswith("no flip"):
@@ -213,10 +218,10 @@ def test_twins_are_seen_beside_each_other(tmp_path: Path, drawn: list[Any]) -> N
         assert abs(by_name[name] - by_name[name.removesuffix("flip") + "no flip"]) >= 2
 
 
-def test_planar_arm_is_drawn_in_its_plane(tmp_path: Path, drawn: list[Any]) -> None:
+def test_planar_arm_is_drawn_in_its_plane(tmp_path: Path, saved_figures: list[Any]) -> None:
     plot_poses(PLANAR, np.deg2rad([20, 50, -30]), str(tmp_path / "planar.png"))
     plot_poses(PLANAR, np.deg2rad([20, 50, -30]), str(tmp_path / "space.png"), view=(20, -60))
-    [plane], [space] = (figure.axes for figure in drawn)
+    [plane], [space] = (figure.axes for figure in saved_figures)
     assert not hasattr(plane, "get_zlim")
     assert hasattr(space, "get_zlim")
     assert plane.get_aspect() == 1.0
@@ -227,12 +232,12 @@ def test_planar_arm_is_drawn_in_its_plane(tmp_path: Path, drawn: list[Any]) -> N
 
 
 @pytest.mark.parametrize("colour", ["manipulability", "step_error", "reach", "z"])
-def test_workspace_picture(tmp_path: Path, drawn: list[Any], surveyed: Workspace, colour: str) -> None:
+def test_workspace_picture(tmp_path: Path, saved_figures: list[Any], survey_of_arm: Workspace, colour: str) -> None:
     picture = tmp_path / "cloud.png"
-    plot_workspace(surveyed, str(picture), colour=colour)
+    plot_workspace(survey_of_arm, str(picture), colour=colour)
     width, _ = size_of_png(picture)
     assert width >= 1200
-    [figure] = drawn
+    [figure] = saved_figures
     cloud, above, side, bar = figure.axes
     assert millimetres_per_millimetre(cloud) == pytest.approx([1, 1, 1])
     assert (above.get_xlabel(), above.get_ylabel()) == ("x / mm", "y / mm")
@@ -242,16 +247,16 @@ def test_workspace_picture(tmp_path: Path, drawn: list[Any], surveyed: Workspace
     assert unit.get(colour, "/ mm") in bar.get_xlabel()
     low, high = side.get_xlim()
     assert low <= 0
-    assert high > np.hypot(*surveyed.tips[:, :2].T).max() * 0.99
+    assert high > np.hypot(*survey_of_arm.tips[:, :2].T).max() * 0.99
     assert any("40,000 samples" in text and "m³ ±" in text for text in texts_of(figure))
     (least, greatest), _ = seen_boxes(figure)
     assert np.all(least >= 0)
     assert greatest[0] < figure.bbox.width * 0.6
 
 
-def test_workspace_of_a_planar_arm(tmp_path: Path, drawn: list[Any]) -> None:
+def test_workspace_of_a_planar_arm(tmp_path: Path, saved_figures: list[Any]) -> None:
     plot_workspace(workspace(PLANAR, 5000, keep=5000), str(tmp_path / "cloud.svg"), colour="reach")
-    [figure] = drawn
+    [figure] = saved_figures
     plane, bar = figure.axes
     assert plane.get_aspect() == 1.0
     assert bar.get_ylabel() == "distance from the base / mm"
@@ -269,9 +274,9 @@ def test_same_input_same_file_other_input_other_file(tmp_path: Path, end: str) -
         assert ElementTree.fromstring(a).tag == "{http://www.w3.org/2000/svg}svg"
 
 
-def test_same_survey_same_picture(tmp_path: Path, surveyed: Workspace) -> None:
+def test_same_survey_same_picture(tmp_path: Path, survey_of_arm: Workspace) -> None:
     for name in "ab":
-        plot_workspace(surveyed, str(tmp_path / f"{name}.png"), colour="z")
+        plot_workspace(survey_of_arm, str(tmp_path / f"{name}.png"), colour="z")
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
 
 

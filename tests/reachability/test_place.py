@@ -54,13 +54,13 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
     read: list[int] = []
     by_radius = place_upright.by_radius
 
-    def counted(*arguments: Any) -> Any:
+    def count_and_call(*arguments: Any) -> Any:
         places = by_radius(*arguments)
         assert places is not None
         read.append(int(places[0].sum()) - int(places[1].sum()))
         return places
 
-    monkeypatch.setattr(place_targets, "by_radius", counted)
+    monkeypatch.setattr(place_targets, "by_radius", count_and_call)
     [places] = armkin.place(arm, targets, **ask)
     assert sum(read) > 0.5 * places.reached.sum() > 0
     monkeypatch.setattr(place_targets, "RADII", 10**9)  # not worth it: each place is asked

@@ -169,12 +169,12 @@ def test_a_trap_is_named_in_two_lines_and_two_seconds(name: str) -> None:
     raw, says = BAD[name]
     texts = []
 
-    def tried() -> None:
+    def read_trap() -> None:
         with pytest.raises((RobotFileError, UsageError)) as caught:
             urdf_reader.parse_urdf(raw, "arm.urdf")
         texts.append(str(caught.value))
 
-    assert least_seconds(tried, 2) < 2
+    assert least_seconds(read_trap, 2) < 2
     assert says in texts[0]
     assert texts[0].startswith("arm.urdf: ")
     assert texts[0].count("\n") <= 1
@@ -262,11 +262,11 @@ def test_nothing_but_the_file_is_opened(monkeypatch: pytest.MonkeyPatch, tmp_pat
     opened: list[str] = []
     real = Path.open
 
-    def noted(self: Path, *words: Any, **named: Any) -> Any:
+    def note_and_call(self: Path, *words: Any, **named: Any) -> Any:
         opened.append(str(self))
         return real(self, *words, **named)
 
-    monkeypatch.setattr(Path, "open", noted)
+    monkeypatch.setattr(Path, "open", note_and_call)
     urdf_reader.read_urdf(path)
     assert opened == [str(path)]
 

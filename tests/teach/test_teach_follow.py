@@ -19,7 +19,7 @@ NEAR = [6, 90, -90]
 
 
 @pytest.fixture
-def following(sim: Page) -> Page:
+def following_page(sim: Page) -> Page:
     """A page that the arm follows: it has done so, and stands."""
     assert sim.act("follow", on=True) == (200, {"on": True})
     assert sim.act("look", q=NEAR, goal=True)[0] == 200
@@ -47,35 +47,35 @@ ENDS: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("name", ENDS)
-def test_what_else_the_board_is_told_ends_following(following: Page, name: str) -> None:
-    following.act(name, **ENDS[name])
-    following.idle()
-    assert not following.state()["follows"]
-    following.act("look", q=[0, 80, -80], goal=True)
-    assert is_at_rest(following)
+def test_what_else_the_board_is_told_ends_following(following_page: Page, name: str) -> None:
+    following_page.act(name, **ENDS[name])
+    following_page.idle()
+    assert not following_page.state()["follows"]
+    following_page.act("look", q=[0, 80, -80], goal=True)
+    assert is_at_rest(following_page)
 
 
-def test_a_jog_that_ends_leaves_the_arm_there(following: Page) -> None:
-    following.jog(lambda now: now["joints"][0] >= 12, joint=0, percent=50)
-    following.let_go()
-    following.idle()
-    following.act("look", q=NEAR)  # as the page asks for its numbers when a job has ended
-    assert is_at_rest(following)
-    assert following.state()["joints"][0] > 12
+def test_a_jog_that_ends_leaves_the_arm_there(following_page: Page) -> None:
+    following_page.jog(lambda now: now["joints"][0] >= 12, joint=0, percent=50)
+    following_page.let_go()
+    following_page.idle()
+    following_page.act("look", q=NEAR)  # as the page asks for its numbers when a job has ended
+    assert is_at_rest(following_page)
+    assert following_page.state()["joints"][0] > 12
 
 
-def test_only_what_is_dragged_or_typed_is_a_goal(following: Page) -> None:
-    following.act("look", q=NEAR, best=True)  # a setting
-    following.act("plan")
-    assert is_at_rest(following)
-    assert following.state()["follows"]
-    following.act("look", q=[40, 60, -60])  # the page shows another posture: a preview, a branch, a named pose
-    assert is_at_rest(following)
-    assert not following.state()["follows"]  # a drag from there would take the whole arm along
+def test_only_what_is_dragged_or_typed_is_a_goal(following_page: Page) -> None:
+    following_page.act("look", q=NEAR, best=True)  # a setting
+    following_page.act("plan")
+    assert is_at_rest(following_page)
+    assert following_page.state()["follows"]
+    following_page.act("look", q=[40, 60, -60])  # the page shows another posture: a preview, a branch, a named pose
+    assert is_at_rest(following_page)
+    assert not following_page.state()["follows"]  # a drag from there would take the whole arm along
 
 
-def test_a_take_over_ends_following(following: Page) -> None:
-    watcher = Page(following.server)
+def test_a_take_over_ends_following(following_page: Page) -> None:
+    watcher = Page(following_page.server)
     assert watcher.opened["board"]["follows"]
     assert watcher.act("take")[0] == 200
     assert watcher.hear("board", lambda state: not state["follows"])
@@ -84,30 +84,30 @@ def test_a_take_over_ends_following(following: Page) -> None:
     watcher.close()
 
 
-def test_it_follows_the_page_that_switched_it_on_alone(following: Page) -> None:
+def test_it_follows_the_page_that_switched_it_on_alone(following_page: Page) -> None:
     """A drag that is still being solved for while another page takes over and follows moves nothing."""
-    board = following.server.actions.board
+    board = following_page.server.actions.board
     assert board is not None
-    watcher = Page(following.server)
-    late = following.server.actions.tabs.find(following.id)
+    watcher = Page(following_page.server)
+    late = following_page.server.actions.tabs.find(following_page.id)
     assert watcher.act("take")[0] == 200
     assert watcher.act("follow", on=True) == (200, {"on": True})
-    board.follow_pose(late, following.server.actions.arm.home)
+    board.follow_pose(late, following_page.server.actions.arm.home)
     assert is_at_rest(watcher)
     watcher.close()
 
 
-def test_a_line_that_breaks_ends_following(following: Page, monkeypatch: pytest.MonkeyPatch) -> None:
-    board = following.server.actions.board
+def test_a_line_that_breaks_ends_following(following_page: Page, monkeypatch: pytest.MonkeyPatch) -> None:
+    board = following_page.server.actions.board
     assert board is not None
 
-    def broken() -> None:
+    def break_line() -> None:
         raise LinkError("unplugged")
 
-    monkeypatch.setattr(board.thread.machine, "refresh", broken)
-    assert following.hear("board", lambda state: "unplugged" in state["error"])["follows"] is False
-    following.act("look", q=HOME, goal=True)
-    assert following.idle()["connected"] is False  # nothing has opened the port again, either
+    monkeypatch.setattr(board.thread.machine, "refresh", break_line)
+    assert following_page.hear("board", lambda state: "unplugged" in state["error"])["follows"] is False
+    following_page.act("look", q=HOME, goal=True)
+    assert following_page.idle()["connected"] is False  # nothing has opened the port again, either
 
 
 def test_a_lost_position_is_not_followed_from(sim: Page, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,7 +136,7 @@ def test_the_page_s_follow(browser: Browser) -> None:
             page.locator("#sliders input[type=range]").nth(slider).fill(str(value))
             wait_for_answers(page)
 
-        def unfollowed() -> None:
+        def wait_until_unfollowed() -> None:
             wait_until(page, "!document.querySelector('#follow').checked")
 
         def still(counts: object) -> bool:
@@ -163,18 +163,18 @@ def test_the_page_s_follow(browser: Browser) -> None:
         for button in ("#branch-0", "#branch-1"):
             page.click(button)
             wait_for_answers(page)
-        unfollowed()
+        wait_until_unfollowed()
         follow()
         page.get_by_role("button", name="home", exact=True).click()
         wait_for_answers(page)
-        unfollowed()
+        wait_until_unfollowed()
         drag(0, 110)  # so far that it plays for seconds
         page.click("#record")
         page.wait_for_selector("#player:not([hidden])")
         follow()
         page.click("#play")
         wait_until(page, "document.querySelector('#play').textContent === 'Pause'")
-        unfollowed()
+        wait_until_unfollowed()
         page.click("#play")
         wait_for_answers(page)
         assert still(at)
@@ -185,12 +185,12 @@ def test_the_page_s_follow(browser: Browser) -> None:
         page.mouse.up()
         wait_for_board(page, "jog: done")
         wait_for_answers(page)
-        unfollowed()
+        wait_until_unfollowed()
         assert still(server.actions.standing_pulses())
         # A page that takes over has it off, and its own drag moves nothing.
         follow()
         assert second_page.act("take")[0] == 200
-        unfollowed()
+        wait_until_unfollowed()
         second_page.close()
         page.click("#take")
         wait_until(page, "!document.querySelector('#panels').inert")

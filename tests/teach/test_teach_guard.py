@@ -22,23 +22,23 @@ def server() -> Iterator[Server]:
 
 
 @pytest.fixture
-def acted(server: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def actions_done(server: Server, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Names of the actions that were carried out."""
     names: list[str] = []
     actions = server.actions
     before = actions.act
 
-    def noted(name: str, tab: str, fields: dict[str, Any]) -> dict[str, Any]:
+    def note_and_call(name: str, tab: str, fields: dict[str, Any]) -> dict[str, Any]:
         names.append(name)
         return before(name, tab, fields)
 
-    monkeypatch.setattr(actions, "act", noted)
+    monkeypatch.setattr(actions, "act", note_and_call)
     return names
 
 
-def test_the_page_itself_may_act(server: Server, acted: list[str]) -> None:
+def test_the_page_itself_may_act(server: Server, actions_done: list[str]) -> None:
     assert carry_out_action(server, "stop") == (200, {})
-    assert acted == ["stop"]
+    assert actions_done == ["stop"]
 
 
 ATTACKS: dict[str, tuple[dict[str, str | None], int]] = {
@@ -61,21 +61,21 @@ ATTACKS: dict[str, tuple[dict[str, str | None], int]] = {
 
 
 @pytest.mark.parametrize("name", ATTACKS)
-def test_an_attack_does_nothing(server: Server, acted: list[str], name: str) -> None:
+def test_an_attack_does_nothing(server: Server, actions_done: list[str], name: str) -> None:
     changes, expected = ATTACKS[name]
     headers = {**good_headers(server), **changes}
     body = b"{}" if "Transfer-Encoding" not in headers else b"2\r\n{}\r\n0\r\n\r\n"
     status, _, data = ask(server, "POST", "/api/stop", body, {k: v for k, v in headers.items() if v is not None})
     assert status == expected
     assert json.loads(data)["error"]
-    assert acted == []
+    assert actions_done == []
 
 
-def test_the_key_of_another_run_does_nothing(server: Server, acted: list[str]) -> None:
+def test_the_key_of_another_run_does_nothing(server: Server, actions_done: list[str]) -> None:
     with serve_robot() as second_server:
         headers = {**good_headers(server), "X-Armkin-Key": second_server.guard.key}
         assert ask(server, "POST", "/api/stop", b"{}", headers)[0] == 403
-    assert acted == []
+    assert actions_done == []
 
 
 @pytest.mark.parametrize(
@@ -93,18 +93,18 @@ def test_the_key_of_another_run_does_nothing(server: Server, acted: list[str]) -
         b'{"q": ' + b"9" * 5000 + b"}",
     ],
 )
-def test_a_body_that_is_no_json_object_is_refused(server: Server, acted: list[str], body: bytes) -> None:
+def test_a_body_that_is_no_json_object_is_refused(server: Server, actions_done: list[str], body: bytes) -> None:
     status, _, data = ask(server, "POST", "/api/stop", body, good_headers(server))
     assert status == 400
     assert "JSON" in json.loads(data)["error"]
-    assert acted == []
+    assert actions_done == []
 
 
-def test_ten_megabytes_are_not_read(server: Server, acted: list[str]) -> None:
+def test_ten_megabytes_are_not_read(server: Server, actions_done: list[str]) -> None:
     headers = {**good_headers(server), "Content-Length": str(10 << 20)}
     status, _, _ = ask(server, "POST", "/api/stop", b"x" * 1000, headers)
     assert status == 413
-    assert acted == []
+    assert actions_done == []
 
 
 @pytest.mark.parametrize(

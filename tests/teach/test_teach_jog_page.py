@@ -48,7 +48,7 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
             sign = "!" if ends else ""
             wait_until(page, f"{sign}document.querySelector('#standing').textContent.startsWith('jog')")
 
-        def looked(times: int) -> None:
+        def wait_for_looks(times: int) -> None:
             """Until the page has looked at the gamepad: a busy one does so late."""
             wait_until(page, "looked >= argument", page.evaluate("looked") + times)
 
@@ -79,13 +79,13 @@ def test_the_tip_is_jogged_by_a_button_and_by_a_gamepad_and_its_joints_are_chart
         page.check("#gamepad")
         wait_until(page, "document.querySelector('#pad').textContent.includes('hold a shoulder')")
         assert page.locator("#pad b").count() == 0  # its name is text
-        looked(6)
+        wait_for_looks(6)
         assert joints() == stands
         pull, let_go = (f"() => {{ pad.buttons[5].pressed = {pressed}; }}" for pressed in ("true", "false"))
 
         def release() -> None:
             page.evaluate(let_go)
-            looked(2)
+            wait_for_looks(2)
 
         hold_jog(page, partial(page.evaluate, pull), release, lambda: page.text_content("#position") != stood)
         release()

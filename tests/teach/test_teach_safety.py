@@ -24,7 +24,7 @@ HOME = [0, 90, -90]
 
 
 @pytest.fixture
-def emulated() -> Iterator[tuple[Page, EmulatedBoard]]:
+def page_and_board() -> Iterator[tuple[Page, EmulatedBoard]]:
     with EmulatedBoard() as board, serve_robot(board=board.port) as server:
         page = Page(server)
         page.hear("control", lambda news: news["holder"] == "yours")
@@ -53,9 +53,9 @@ def begin_move(page: Page, board: EmulatedBoard) -> None:
 
 
 def test_a_lost_position_is_not_sent_from_and_home_is_assumed_with_consent(
-    emulated: tuple[Page, EmulatedBoard],
+    page_and_board: tuple[Page, EmulatedBoard],
 ) -> None:
-    page, board = emulated
+    page, board = page_and_board
     assert page.idle()["position"] == "lost"
     page.act("send", q=POSE, speed=100)
     assert "position is lost" in page.idle()["error"]
@@ -70,9 +70,9 @@ def test_a_lost_position_is_not_sent_from_and_home_is_assumed_with_consent(
 
 
 def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under_way(
-    emulated: tuple[Page, EmulatedBoard], monkeypatch: pytest.MonkeyPatch
+    page_and_board: tuple[Page, EmulatedBoard], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    page, board = emulated
+    page, board = page_and_board
     held: list[float] = []
     before = Session.hold
 
@@ -114,8 +114,8 @@ def test_stop_is_on_the_line_within_a_tenth_of_a_second_while_requests_are_under
     assert min(took) < 0.1
 
 
-def test_a_closed_page_holds_the_arm(emulated: tuple[Page, EmulatedBoard]) -> None:
-    page, board = emulated
+def test_a_closed_page_holds_the_arm(page_and_board: tuple[Page, EmulatedBoard]) -> None:
+    page, board = page_and_board
     begin_move(page, board)
     page.close()
     rests_within(board, 1.0)
@@ -124,8 +124,8 @@ def test_a_closed_page_holds_the_arm(emulated: tuple[Page, EmulatedBoard]) -> No
     assert state["pulses"] == net_steps(board) != COUNTS
 
 
-def test_a_watching_page_that_is_closed_holds_nothing(emulated: tuple[Page, EmulatedBoard]) -> None:
-    page, board = emulated
+def test_a_watching_page_that_is_closed_holds_nothing(page_and_board: tuple[Page, EmulatedBoard]) -> None:
+    page, board = page_and_board
     watcher = Page(page.server)
     begin_move(page, board)
     watcher.close()
