@@ -132,11 +132,11 @@ def motion_progress(plans: Sequence[Planned], note: Callable[[float], None]) -> 
     """A bar for the plans' time on a terminal, and the note of a motion under way."""
     with output.progress("ms of motion", round(1000 * sum(plan.duration for plan in plans))) as tick:
 
-        def tell(elapsed: float, _: float) -> None:
+        def report(elapsed: float, _: float) -> None:
             note(elapsed)
             tick(round(1000 * elapsed))
 
-        yield tell
+        yield report
 
 
 def resumed_note(board: Board, resume: bool) -> Any:

@@ -53,7 +53,7 @@ class Keys:
             return None
         last = time.monotonic()
 
-        def more() -> bool:
+        def is_held() -> bool:
             nonlocal last
             pressed = self._poll(_POLL)
             if pressed == key:
@@ -62,7 +62,7 @@ class Keys:
                 self._next_key = pressed
             return pressed in ("", key) and time.monotonic() - last < _AGAIN
 
-        return more
+        return is_held
 
     def _wait_for_silence(self) -> None:
         """Wait until no key comes: one that was held until now answers nothing."""

@@ -66,11 +66,11 @@ def _by_name(text: str, name: str) -> str:
     """A module's imports by the names of the import map: a `data:` URL has no place that others stand beside."""
     folder = Path("/") / Path(name).parent
 
-    def named(match: re.Match[str]) -> str:
+    def map_import(match: re.Match[str]) -> str:
         path = match[2] if match[2].startswith("/") else str((folder / match[2]).as_posix())
         return f'{match[1]}"armkin{path}"'
 
-    return _IMPORT.sub(named, text)
+    return _IMPORT.sub(map_import, text)
 
 
 def _data_url(text: str) -> str:

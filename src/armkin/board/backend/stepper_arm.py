@@ -108,11 +108,11 @@ class StepperArm(Backend):
             self._begin(job, position_read=was_read)
             total += job.duration
 
-            def tell(t: float, elapsed: float = elapsed, total: float = total) -> None:
+            def report_time(t: float, elapsed: float = elapsed, total: float = total) -> None:
                 progress(min(elapsed + t, total), total)
 
             try:
-                is_complete = self._carry_out(job, tell)
+                is_complete = self._carry_out(job, report_time)
             except LinkError as error:
                 raise self._explain(error) from None
             if not is_complete:

@@ -146,7 +146,7 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     columns = chunk.values, r.pulses, moves, units.joints_out(arm, r.actual_joints), *tips, r.error
     violations, beyond_travel = render.violations(arm, chunk.values, q), outside_travel(arm, r.pulses).tolist()
     rows = map(_Row, *(column.tolist() for column in columns), violations, beyond_travel)
-    beside_best = repeat({}) if best_vectors is None else _rounded(best_vectors)
+    beside_best = repeat({}) if best_vectors is None else _rounded_keys(best_vectors)
     in_scene = render.scene_and_tool(arm)
     for row, near, plain in zip(rows, render.near_by(arm, q), beside_best, strict=False):
         answer = row.answer(of_all)
@@ -156,7 +156,7 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         yield answer
 
 
-def _rounded(best: Best) -> Iterator[Any]:
+def _rounded_keys(best: Best) -> Iterator[Any]:
     """What plain rounding comes to, beside the best vectors: keys of each row."""
     for pulses, error, gain in zip(
         *(x.tolist() for x in (best.rounded.pulses, best.rounded.error, best.gain)), strict=True

@@ -39,18 +39,18 @@ def status(
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     with board_link.open_backend(board, port, baud, simulated=unknown_note, reset=not no_reset) as machine:
 
-        def found() -> dict[str, Any]:
+        def status_json() -> dict[str, Any]:
             head = {**render.head(arm), "port": machine.port.name, "board": board.kind}
             return {**head, **where_arm_stands(machine), **machine.report()}
 
-        def text(found: dict[str, Any]) -> str:
-            words = _servos_text if "servos" in found else _grbl_text if "settings" in found else _text
-            return render.to_json(found) + "\n" if json else board_link.where_text(arm, found) + words(found)
+        def text(status: dict[str, Any]) -> str:
+            words = _servos_text if "servos" in status else _grbl_text if "settings" in status else _text
+            return render.to_json(status) + "\n" if json else board_link.where_text(arm, status) + words(status)
 
         if watch:
-            _print_changes(text(found()) for _ in _until_signal(machine.refresh, board.stop))
+            _print_changes(text(status_json()) for _ in _until_signal(machine.refresh, board.stop))
             return
-        answer = text(found())
+        answer = text(status_json())
     with output.destination(None) as write:
         write(answer)
 
