@@ -15,6 +15,7 @@ from armkin.inverse.singular.local_structure import Structure, leave_spans, memb
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
+FEW_LINKS = 4  # curves on each side of a posture whose component leaves a shortened span: others are told elsewhere
 LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 
 
@@ -39,7 +40,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     start, ahead = leave_spans(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
     finished = np.isnan(start[:, 0])
     going = np.flatnonzero(~finished)
-    for _ in range(LINKS):
+    for count in range(1, LINKS + 1):
         if not len(going):
             break
         row, last, way, rows = curve[going], start[going], ahead[going], np.arange(len(going))
@@ -59,7 +60,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         onto, onwards = leave_spans(arm, link, rows, last, way)
         start[going[good]], ahead[going[good]] = onto[good], onwards[good]
         finished[going] = good & (home | np.isnan(onto[:, 0]))
-        enough = ~at.known & ((most - least).max(axis=1) >= tol.REACH)
+        enough = ~at.known & ((count == FEW_LINKS) | ((most - least).max(axis=1) >= tol.REACH))
         going = going[~(finished[going] | enough[row]) & (link.second > tol.HIGH)]
     extent, ended[left] = (most - least)[left], finished.reshape(2, -1).all(axis=0)
     at.manifold[left] = extent.max(axis=1) >= tol.REACH
