@@ -25,7 +25,7 @@ from exported_js import ask_module, differences, goals_of
 import armkin
 from armkin.errors import UsageError
 from armkin.export.c.c_program import identifier, program
-from armkin.export.js.es_module import module
+from armkin.export.js.es_module import module_text
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.model.arm import actual_arm
 from armkin.robot_file import catalogue
@@ -89,7 +89,7 @@ def postures(arm: armkin.Arm, random: int, typed: int, seed: int) -> np.ndarray:
 
 def speed_line(arm: armkin.Arm, folder: Path) -> str:
     """Microseconds a target in node and in C."""
-    javascript = module(arm)
+    javascript = module_text(arm)
     general = "general elimination" in javascript.split("export", 1)[0]
     turn = np.where(arm.prismatic, arm.reach, np.pi)
     low, high = np.maximum(arm.lower, -turn), np.minimum(arm.upper, turn)

@@ -22,7 +22,7 @@ START = "moves:\n  - point: [390, 80, 300]\n"
         (
             "g.yaml",
             START + "\n  - circle: {centre: [390, 120, 300], normal: [0, 0, 0]}\n",
-            "g.yaml:4: move 2: circle: its normal has no length",
+            "g.yaml:4: move 2: circle: its normal [0.0, 0.0, 0.0] has no length; give the direction of the circle's",
         ),
         (
             "g.yaml",

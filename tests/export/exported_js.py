@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import armkin
-from armkin.export.js.es_module import module
+from armkin.export.js.es_module import module_text
 from armkin.inverse.numeric.newton import difference
 from armkin.inverse.singular.local_structure import local_structure, members
 from armkin.inverse.solvers.recognise import solver
@@ -21,7 +21,7 @@ from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual_arm
 
 # of one arm there is one text in all tests of a process
-_text_of = cache(module)
+_text_of = cache(module_text)
 
 _ASK = """
 import * as arm from './arm.mjs';

@@ -14,7 +14,7 @@ from exported_js import ask_module, differences, goals_of
 import armkin
 import right_angles
 from armkin.errors import UsageError
-from armkin.export.js.es_module import module
+from armkin.export.js.es_module import module_text
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.inverse.tasks.residuals import residual
@@ -227,7 +227,7 @@ def test_hits_are_those_of_python(name: str, tmp_path: Path) -> None:
 
 def test_a_name_in_the_module_ends_no_script_and_no_line() -> None:
     arm = replace(armkin.load("three_dof"), name="</script><script>alert(1)//\u2028throw 1")
-    text = module(arm)
+    text = module_text(arm)
     assert "</script" not in text
     assert "\u2028" not in text
 
@@ -291,4 +291,4 @@ def test_an_arm_that_only_python_solves_has_no_module() -> None:
     link = np.concatenate([panda.link, np.broadcast_to(np.eye(4), (1, 4, 4))])
     link[-1, 2, 3], link[-2, 0, 3] = 100.0, 50.0
     with pytest.raises(UsageError, match="8 joints"):
-        module(armkin.model.arm.from_links(link, [False] * 8))
+        module_text(armkin.model.arm.from_links(link, [False] * 8))

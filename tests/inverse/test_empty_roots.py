@@ -62,7 +62,7 @@ def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytes
 
 
 def test_steps_are_not_spent_on_complex_roots_that_stand_for_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Of a Niryo's 300 poses 577 candidates of 3,004 missed them by 1 and more; 200 are left: roots close by."""
+    """Of a Niryo's 300 poses 577 candidates of 3,004 missed them by 1 and more; 199 are left: roots close by."""
     arm, missed = armkin.load("niryo_ned2"), []
     armkin.method(arm)
 
@@ -73,4 +73,4 @@ def test_steps_are_not_spent_on_complex_roots_that_stand_for_nothing(monkeypatch
 
     monkeypatch.setattr(passes, "refine", watch_and_call)
     armkin.ik(arm, armkin.fk(arm, np.random.default_rng(0).uniform(-np.pi, np.pi, (300, 6))), examine=False)
-    assert 0 < missed[0] < 300
+    assert 0 < missed[0] < 220

@@ -24,7 +24,7 @@ def hold_acceleration(plan: armkin.PathPlan) -> float:
         if not isinstance(curve, Curve):
             continue
         for t in np.linspace(0.02, curve.duration - 0.02, 200):
-            v = curve.place(np.array([t]))[2][0]
+            v = curve.locate(np.array([t]))[2][0]
             q = curve.evaluate(np.array([t - 1e-4, t, t + 1e-4]))
             s = curve.lengths(np.array([t - 1e-4, t, t + 1e-4]))
             first = (q[2] - q[0]) / (s[2] - s[0])

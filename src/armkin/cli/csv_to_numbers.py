@@ -341,8 +341,10 @@ def _text_of(line: bytes, encoding: str) -> str:
         text = line.decode(encoding).strip()
     except UnicodeDecodeError:
         raise UsageError("this is no UTF-8 text") from None
-    if len(line) >= LONGEST or "\0" in text:
-        raise UsageError("this is no CSV of numbers")
+    if "\0" in text:
+        raise UsageError("this is no CSV of numbers: it holds a NUL byte")
+    if len(line) >= LONGEST:
+        raise UsageError(f"this is no CSV of numbers: a line has at most {LONGEST - 1:,} bytes")
     return text
 
 
@@ -353,7 +355,7 @@ def _split_cells(text: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
     except csv.Error:
-        raise UsageError("this is no CSV of numbers") from None
+        raise UsageError("this is no CSV of numbers: its quotes do not match") from None
 
 
 def _column_places(heading: Sequence[str], name: str) -> list[int]:

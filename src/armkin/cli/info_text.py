@@ -6,7 +6,7 @@ from typing import Any
 from armkin.cli.render import short_text, table, wrap_text
 
 
-def text(answer: Mapping[str, Any]) -> str:
+def arm_summary(answer: Mapping[str, Any]) -> str:
     """The whole summary."""
     joints = answer["joints"]
     kinds = "".join("P" if joint["type"] == "prismatic" else "R" for joint in joints)

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 
-def text(plan: PathPlan, answer: dict[str, Any]) -> str:
+def plan_summary(plan: PathPlan, answer: dict[str, Any]) -> str:
     """The plan for people."""
     parts = [_head_lines(plan, answer)]
     if answer["branches"]:

@@ -75,7 +75,7 @@ def _add_circle(walk: Walk, move: Move, value: Any) -> None:
     flat = walk.task.position == 2
     normal = np.array([0.0, 0.0, 1.0]) if flat else path_numbers.coordinates(walk.task, value.normal)
     if np.linalg.norm(normal) < 1e-9:
-        raise UsageError("circle: its normal has no length")
+        raise UsageError(f"circle: its normal {value.normal} has no length; give the direction of the circle's axis")
     centre, angle = path_numbers.coordinates(walk.task, value.centre), 2 * np.pi * value.turns
     walk.add_piece(move, path_pieces.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
 

@@ -33,9 +33,9 @@ def solver_json(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
 
 def own_solver(arm: Arm) -> dict[str, Any]:
     """The module's text and `about`; none where the arm has no module."""
-    from armkin.export.js.es_module import module  # only pages that are open need it
+    from armkin.export.js.es_module import module_text  # only pages that are open need it
 
     try:
-        return {"module": module(arm), "about": solver_json(arm)}
+        return {"module": module_text(arm), "about": solver_json(arm)}
     except UsageError:
         return {"module": None, "about": None}

@@ -9,7 +9,7 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armkin.export.js.es_module import module
+from armkin.export.js.es_module import module_text
 from armkin.teach.arm_description import scene_json
 from armkin.teach.browser_solver import solver_json
 from armkin.teach.plan_samples import playback_json
@@ -37,7 +37,7 @@ def arm_html(
     modules["js/server.js"] = _LOCAL.read_text(encoding="utf-8").replace('"../static/js/', '"./')
     for path in sorted((_STATIC / "vendor" / "three").glob("*.js")):
         modules[f"vendor/three/{path.name}"] = path.read_text(encoding="utf-8")
-    modules |= {"arm.js": module(arm, task_name), "data.js": _page_json(arm, task_name, plan, meshes)}
+    modules |= {"arm.js": module_text(arm, task_name), "data.js": _page_json(arm, task_name, plan, meshes)}
     imports = {f"armkin/{name}": _data_url(_by_name(_strip_comments(text), name)) for name, text in modules.items()}
     imports["three"] = imports.pop("armkin/vendor/three/three.module.min.js")
     import_map = re.sub("<(?=[/!]|script)", r"\\u003c", json.dumps({"imports": imports}), flags=re.IGNORECASE)

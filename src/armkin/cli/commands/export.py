@@ -122,10 +122,10 @@ def _write_json(arm: Arm, out: str | None) -> None:
 
 
 def _write_js(arm: Arm, task: str | None, out: str | None) -> None:
-    from armkin.export.js.es_module import module
+    from armkin.export.js.es_module import module_text
 
     with _without_lock("JavaScript"):
-        text = module(arm, task)
+        text = module_text(arm, task)
     with output.destination(out) as write:
         write(text)
 

@@ -29,9 +29,9 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
         if json:
             write(f"{render.to_json(answer)}\n")
         else:
-            from armkin.cli.info_text import text
+            from armkin.cli.info_text import arm_summary
 
-            write(text(answer))
+            write(arm_summary(answer))
 
 
 def _answer(arm: Arm, task: str | None) -> Info:

@@ -348,4 +348,4 @@ def _write_samples(plan: PathPlan, name: str) -> None:
 def _print_answer(plan: PathPlan, answer: dict[str, Any], *, json: bool, out: str | None = None) -> None:
     """The answer, on stderr while the samples of `--out -` have stdout."""
     with output.answer_stream(out) as write:
-        write(render.to_json(answer) + "\n" if json else path_text.text(plan, answer))
+        write(render.to_json(answer) + "\n" if json else path_text.plan_summary(plan, answer))

@@ -43,7 +43,7 @@ _KEEP_OUT_IS = """/** @type {{thick: number[], solid: number, moving: number[][]
 _SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "surfaces", "ik", "closest")
 
 
-def module(arm: Arm, task_name: str | None = None) -> str:
+def module_text(arm: Arm, task_name: str | None = None) -> str:
     """An arm as the text of an ES module: names, limits, home, fk, jacobian, target, ik, pulses, joints.
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.

@@ -24,8 +24,8 @@ from armkin.model.arm import Arm
 FEW = 8  # targets that plain Python does sooner than arrays
 FREED = 24  # values tried for joints that a target leaves free
 CLOSER = 7  # times that the best of these is sought sixteen times closer: to 1e-9 rad
-# all round, as steps from `near` [rad], beside round values: where a wrist is straight its joints are free, too, and
-# jump to what is preferred
+# Steps from `near` [rad] all round, none of them to a round value: there a wrist may be straight, whose joints are free
+# as well and would jump to what is preferred.
 ROUND = np.asarray((np.arange(FREED)[:, None] + 0.37) * (2.0 * np.pi / FREED) - np.pi, np.float64)
 SHAKEN = 8  # moves of a target to where nothing is free
 
@@ -124,7 +124,7 @@ class Recorded:
         if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
             return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
         exact = np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
-        chosen, held = four_bars.one_a_circuit(self.arm, exact, near)
+        chosen, held = four_bars.one_per_circuit(self.arm, exact, near)
         of_linkage: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
         linkage = np.asarray(of_linkage.any(axis=1))
         # what else does not depend on the free joint is known already

@@ -65,7 +65,7 @@ def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
     return np.asarray((np.where(four == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
 
 
-def one_a_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
+def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     """Of postures q (N, S, B, n), nan where there is none, those that stand for the circuits of four bars.
 
     near: (N, n). The S postures of a column are of one self-motion, moved by the joints that differ. Returns (N, S, B)

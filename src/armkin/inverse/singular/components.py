@@ -347,7 +347,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
         # towards a root of third order each step goes a third of the way
         flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)
     q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
-    # `near` is taken as it is, or not at all, or is the posture that stands for a self-motion already
+    # `near` is a candidate as it is, where it solves the target; where it stands for a self-motion already it is none
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
     q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
     missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~present).any(axis=1)

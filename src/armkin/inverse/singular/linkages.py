@@ -121,7 +121,7 @@ def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Arra
     way = newton.difference(arm, a, b)
     held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
     if line.any():
-        # what the two that turn differ by, besides a way along the line; before and behind the first of them
+        # along a line one joint turns back what the other turns: what is left of both turns is no way along it
         first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
         left = np.abs(wrap_angle(np.where(first, d * way, -d * way).sum(axis=-1)))
         held = np.where(line, np.maximum(held, left), held)

@@ -17,7 +17,7 @@ from armkin.model.units import radian_or_reach
 
 NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
 INDEPENDENT = 1e-4  # singular value of a task's independent rows
-Z = np.array([0.0, 0.0, 1.0])  # of the base
+Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 
 
 def task_for(arm: Arm, name: str | None = None) -> Task:

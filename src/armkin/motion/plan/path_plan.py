@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
@@ -234,8 +235,7 @@ class PathPlan:
         last = np.searchsorted(begins, when, side="right") - 1  # on the way, or behind it
         for i, rows in group_numbers(last):
             if i >= 0:
-                stretch, base = self.on_path[numbers[i]]
-                assert isinstance(stretch, Curve | Smoothed)
+                stretch, base = self._stretch(numbers[i])
                 lengths[rows] = base + stretch.lengths(when[rows] - begins[i])
         return lengths.reshape(np.shape(t))
 
@@ -247,9 +247,11 @@ class PathPlan:
 
         Returns:
             Begin and end [mm].
+
+        Raises:
+            UsageError: no stretch of that number lies on the tool's way.
         """
-        stretch, base = self.on_path[number]
-        assert isinstance(stretch, Curve | Smoothed)
+        stretch, base = self._stretch(number)
         s = joint_way(stretch).s
         return base + float(s[0]), base + float(s[-1])
 
@@ -261,10 +263,20 @@ class PathPlan:
 
         Returns:
             (N, n) [rad | mm].
+
+        Raises:
+            UsageError: no stretch of that number lies on the tool's way.
         """
-        stretch, _ = self.on_path[number]
+        return joint_way(self._stretch(number)[0]).q
+
+    def _stretch(self, number: int) -> tuple[Curve | Smoothed, float]:
+        """A stretch on the tool's way, and where it begins on it [mm]."""
+        if number not in self.on_path:
+            there = ", ".join(map(str, sorted(self.on_path))) or "none"
+            raise UsageError(f"stretch {number} is not on the tool's way; on it are: {there}")
+        stretch, base = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
-        return joint_way(stretch).q
+        return stretch, base
 
     @cached_property
     def limits(self) -> dict[str, Array]:

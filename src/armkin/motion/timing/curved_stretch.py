@@ -58,7 +58,7 @@ class Curve:
         """Greatest speed of every joint at the grid points: (n,)."""
         return np.asarray(np.abs(self.path.d * np.sqrt(self.x)[:, None]).max(axis=0))
 
-    def place(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
+    def locate(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
         """Interval, way into it, ds/dt and d2s/dt2 at times t: (T,) each."""
         when = np.clip(t, 0.0, self.duration)
         i = np.clip(np.searchsorted(self.times, when, side="right") - 1, 0, len(self._u) - 1)
@@ -68,12 +68,12 @@ class Curve:
 
     def lengths(self, t: Array) -> Array:
         """s at times t: (T,) -> (T,)."""
-        i, along, _, _ = self.place(t)
+        i, along, _, _ = self.locate(t)
         return np.asarray(self.path.s[i] + along)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
-        i, along, v, u = self.place(np.asarray(t, dtype=float))
+        i, along, v, u = self.locate(np.asarray(t, dtype=float))
         w, c2, c3 = along[:, None], *(part.take(i, axis=0) for part in self._bends)
         d0 = self.path.d.take(i, axis=0)
         if derivative == 0:

@@ -89,7 +89,7 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     used, parts = np.ones(len(y) - 1, bool), []
     for round_ in range(_TRIES + 1):
         begin, end, powers, missed = _fit_cubics(chords, used, tolerance)
-        # cubics that waver: the chords themselves, rounded; in the end all of such a curve's
+        # where cubics waver between the points rounded chords take their place; in the last round all of a curve
         again = _chords_of_curves(chords, missed)
         final = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
         parts.append((begin[final], end[final], powers[final]))
