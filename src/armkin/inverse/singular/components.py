@@ -164,6 +164,8 @@ class _Groups:
         """What components these candidates lie on that lose one direction, if that is not known."""
         (arm, task, target, _), q = self.goals, self.at.q
         unasked = ~self.asked[k, b]
+        if not unasked.any():
+            return
         k, b = k[unasked], b[unasked]
         self.asked[k, b] = True
         single = self.lost.nullity[k, b] < 2
@@ -240,10 +242,12 @@ class _Groups:
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
         """
-        thick = self.tube[k, b] > tol.TURNED
-        i, c = np.nonzero(alike & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & (self.tube[k] > tol.TURNED))
+        beside = (self.tube[k, b] > tol.TURNED) & self.known[k, b] & ~self.moves[k, b]
+        if not beside.any():
+            return
+        i, c = np.nonzero(alike & beside[:, None] & (self.tube[k] > tol.TURNED))
         self._ask(k[i], c)
-        inherits = alike & (thick & self.known[k, b] & ~self.moves[k, b])[:, None] & self.known[k] & self.moves[k]
+        inherits = alike & beside[:, None] & self.known[k] & self.moves[k]
         i, c = np.nonzero(inherits)
         back = self.component[self.place[k[i], c], b[i]]
         i, first = np.unique(i[back], return_index=True)
