@@ -141,7 +141,7 @@ def pack_branches(part: Batch, count: Int) -> None:
     B, most = part.valid.shape[1], int(count.max(initial=0))
     rows = np.flatnonzero(count < most)
     front = np.arange(B) < count[rows, None]
-    # which of these branches goes where: behind the last one of all stands one that is missing
+    # the order of a target's branches; the index behind the last one stands for a place that stays empty
     source = np.full(front.size, front.size)
     source[np.flatnonzero(front)] = np.flatnonzero(part.valid[rows])
     arrays = (part.q, np.nan), (part.within, False), (part.branch, -1)

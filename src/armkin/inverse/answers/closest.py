@@ -204,7 +204,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         active, left = active[~arrived], np.flatnonzero(~arrived)
         if not len(active):
             break
-        # a step downhill along every eigenvector, whatever its curvature; flat ones gently
+        # each eigenvector gets a step downhill, whichever way it curves; where it is flat, a short one
         values, vectors = values[left], vectors[left]
         along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
         step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_VALUE))
@@ -214,7 +214,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
             rows = active[waiting]
             trial = np.clip(q[rows] + shrink * step[waiting] * unit, arm.lower, arm.upper)
             new_cost = _cost(arm, task, trial, target[rows])
-            # equal but for rounding is still a step towards a vanishing gradient
+            # a cost that rounding alone tells from the last is accepted: the gradient may still vanish along it
             better = new_cost <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
             q[rows[better]], cost[rows[better]] = trial[better], new_cost[better]
             waiting = waiting[~better]

@@ -170,7 +170,7 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     way = wrist - shoulder
     length = np.linalg.norm(way, axis=1)
     tilt = np.abs(way[:, 2]) / np.maximum(length, tol.NO_LENGTH)
-    # far out, no offset of the shoulder can turn the way round
+    # far from the axis no offset of the shoulder changes the direction of the way
     return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), tol.NO_LENGTH)).reshape(shape)
 
 

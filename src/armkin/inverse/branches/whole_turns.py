@@ -61,7 +61,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
         fits = below & (moved <= upper + SLACK)
         value, below = np.where(fits, moved, value), below & ~fits
-    # a copy is up to SLACK above the half turn, and a legal one as far below the lower end
+    # a copy may lie SLACK above the half turn, and a legal one SLACK below the lower end
     if lower < last + 3 * SLACK and above.any():
         moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
         fits = above & (moved >= lower - SLACK)

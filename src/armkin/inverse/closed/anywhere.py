@@ -67,7 +67,7 @@ def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
     c = names[loop.joints[2]] + 1
     how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
     why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {relation}; {how}"
-    # where one of these is free, its values at which the rest reaches may be few, and other motions cross there
+    # a free joint may leave the others a solution at a few of its values alone, where other self-motions cross
     ends = tuple(names[j] for j in loop.joints)
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
 

@@ -127,7 +127,7 @@ class Recorded:
         chosen, held = four_bars.one_per_circuit(self.arm, exact, near)
         of_linkage: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
         linkage = np.asarray(of_linkage.any(axis=1))
-        # what else does not depend on the free joint is known already
+        # candidates that do not depend on the free joint are known already
         chosen = np.where(linkage[:, None, None], chosen & of_linkage[:, None], miss < tol.HOPELESS**2)
         more = [_each_once(np.where((chosen & lost[:, None, None])[..., None], q, np.nan))]
         solving = np.where((miss < tol.SEED**2)[..., None], q, np.nan)

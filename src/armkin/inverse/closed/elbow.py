@@ -83,7 +83,7 @@ class Elbow:
         x, y, z = self._in_frame_of_joint2(first, before)
         total = (z - self.along) ** 2
         if first.s is not None:
-            # a pair that is off the unit circle has stretched p on its way
+            # a pair off the unit circle scales p: its excess counts as a miss
             stretched = first.c * first.c + first.s * first.s - 1.0
             total = total + stretched * stretched * (before[0] * before[0] + before[1] * before[1])
         return distance2(spin(*second, self.two_link.reach(third)), [x, y]) + total
@@ -163,7 +163,7 @@ class ThreeLink:
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
         c23, s23 = added_angles(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
-        # its angle is what is left of the sum: one arctangent for both elbows
+        # joint 4's angle is what is left of the sum: one arctangent serves both elbows
         q2, q3 = (arrays.arctan2(pair.s, pair.c) for pair in (second, third))
         left = arrays.wrap_angle(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
         return [second, third, fourth], [q2, q3, arrays.mul(self.sense4, left)], doubt

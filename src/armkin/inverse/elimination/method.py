@@ -165,7 +165,7 @@ def _solve_slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
         q = q.reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
         polished = refine(closed.chain, closed.prismatic, q, part[pose], 4)
-        # where links are all but points the loop's unit is as small, and slides are millions of it long
+        # where the links are all but points the loop's unit is so small that slides are millions of it long
         far = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
         good = polished.residual < tol.GRAZING * far
         touching[begin + pose[good & (polished.residual > tol.ELIMINATED * far)]] = True

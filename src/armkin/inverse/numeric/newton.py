@@ -76,7 +76,7 @@ def correct(
         before = best_size[active]
         better = size < before
         best[active[better]], best_size[active[better]] = q[active[better]], size[better]
-        # done when rounding is all that is left
+        # a start is done when what it misses is rounding alone
         least_gain = np.isfinite(size) & (size > tol.ROUNDING) & ((size > tol.CONVERGING) | (size < 0.5 * before))
         idle[active] = np.where((size < 0.9 * before) | (size > stalled), 0, idle[active] + 1)
         going = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)

@@ -204,7 +204,7 @@ def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     a, b, c = (x[:, None] for x in _turning_rate(circles.R))
     middle = psi[:, 1::2]
     up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
-    # a piece shorter than rounding tells nothing: it is as the one before it
+    # a piece shorter than rounding has the sense of the piece before it
     wide = np.diff(ends, axis=1) > tol.EXACT
     before = np.maximum.accumulate(np.where(np.tile(wide, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
     up = np.take_along_axis(up, before, axis=1)
@@ -261,7 +261,7 @@ def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     legal = np.repeat([True, True, False], [len(curve) for curve, *_ in spans])
     curve, first, length = (np.concatenate(column) for column in zip(*spans, strict=True))
     circle, wrist = curve // 4, curve % 2
-    # the best sample, and how far the last joint turns: it is monotone between samples, which makes it sure
+    # the best sample, and how far the last joint turns: between two samples it is monotone
     costs = np.concatenate([s.cost, np.where(s.legal, s.cost, np.inf)]).reshape(-1, 2 * K)
     best = best_samples(costs, curve + len(between) * legal, 2 * first, 2 * length + 1)
     sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)

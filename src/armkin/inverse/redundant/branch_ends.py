@@ -59,7 +59,7 @@ class _Ends:
                 guess = np.where(b <= 0, across, along)
                 inside = ((guess - low) * (high - guess) > 0) & ~over[going] & (k < SECANTS)
             step = np.where(inside, np.abs(guess - value[going]), np.abs(high - low))
-            # a secant along the branch that has gone past the end: it is close by
+            # where a secant along the branch has gone past the end, the end is close by
             guess = np.where(inside, guess, np.where(over[going], high - BACK * (high - low), 0.5 * (low + high)))
             value[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, value[going]))
             left = (step > tol.SAME_END) & (b != 0)
@@ -71,7 +71,7 @@ class _Ends:
             going, guess, inside, room = going[left], guess[left], inside[left], room[left]
             better = room > 0
             over[going] = inside & np.isnan(room)
-            # Illinois: an end that stays twice counts for half
+            # the Illinois rule: the value of an end that has stayed twice is halved
             at_hi[going[better & side[going]]] *= 0.5
             at_lo[going[~better & ~side[going]]] *= 0.5
             side[going] = better

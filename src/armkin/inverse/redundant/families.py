@@ -162,7 +162,7 @@ class _Rows:
             q = _with_free_postures(self.arm, curves, q, near)
         full_turn = pieces.b - pieces.a >= 2 * np.pi
         ends = np.stack([pieces.a, pieces.b], axis=1)
-        # of the turns of the interval that in which the posture lies
+        # the interval is shifted by whole turns to where the posture lies
         ends += (2 * np.pi) * np.round((q[:, self.joint] - ends.mean(axis=1)) / (2 * np.pi))[:, None]
         order = np.lexsort((~pieces.legal, pieces.row))
         interval = np.where(full_turn[:, None], [-np.pi, np.pi], ends)[order]
@@ -227,7 +227,7 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     if isinstance(curves, Followed):  # of others these are samples
         for t in curves.values_to_try(rows_of(curves.pieces, rows), near[rows]):
             costs(rows, t)
-    # beside a kink or a limit the motion grows on both sides: it is the nearest posture
+    # a sample beside which the motion grows both ways is at a kink or limit, and the nearest posture itself
     p = rows_of(curves.pieces, rows)
     beside = [costs(rows, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
     rows = rows[np.minimum(*beside) < motion(arm, p.start, near[rows])]

@@ -104,7 +104,7 @@ def _newton_step(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
     tangent = _tangent(local, held)
     across = np.einsum("mij,mj->mi", tangent.P, local.g)
     flat = np.abs(across).max(axis=1) <= tol.STATIONARY
-    # at rest: a limit whose multiplier pulls away from it lets go, the strongest first
+    # at a stationary point the limit whose multiplier points away from it most strongly is let go
     pull = np.where(held & low, -tangent.slope, np.where(held & high, tangent.slope, -np.inf))
     leaves = flat & (pull.max(axis=1) > tol.STATIONARY)
     values, vectors = np.linalg.eigh(tangent.H)

@@ -121,7 +121,7 @@ class _Curves:
         number = self._on_plane(Nodes(row[arrived], plane[arrived], rows_of(end, arrived)))
         to, place = np.full(len(ray), -1), np.full(len(self.partner), len(ray))
         to[arrived], place[ray] = 2 * number + (plane[arrived] != slab[arrived]), every
-        # an arc is traced from both of its ends: once will do
+        # an arc is traced from both of its ends: one of the two traces is kept
         chosen = (to >= 0) & (self.partner[to] < 0) & (every < place[to]) & (to != ray)
         chosen &= np.isin(every, np.unique(to, return_index=True)[1])
         rays, whose = np.flatnonzero(chosen), np.concatenate([rays for rays, _ in passed])

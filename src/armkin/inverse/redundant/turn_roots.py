@@ -77,7 +77,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     middle, half, series = _cells(degree)
     F, order = len(values), np.arange(TERMS)
     c = values @ _coefficients(degree)
-    # their errors shrink with the order, as the samples lie aside
+    # the coefficients' errors shrink with their order, as the samples lie off the real line
     c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(ASIDE * np.arange(degree + 1, degree + MORE + 1))
     slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)

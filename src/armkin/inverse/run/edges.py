@@ -57,7 +57,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
             doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
             doubts.other[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
         open_, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, left)
-        # with the preferred values for joints that are free, and those that other values would change
+        # seeds: with the preferred values for free joints, and what other values of these would change
         more = [first, second] if loose.any() else [first]
         if runner.geometry.ends:
             hangs: Bool = np.asarray(loose.any(axis=1))
@@ -88,7 +88,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
         if not len(part):
             break
         subset, loose = goals.of(doubts.rows[part]), doubts.loose[part]
-        # of the candidates those that are loose in front
+        # the loose candidates come first
         B = np.arange(loose.shape[1])
         column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
         linked = linkages.settle(
@@ -122,7 +122,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
 def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
     arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
-    # what is singular hangs on the last digit
+    # whether a target is singular depends on the last digit: plain numbers give every batch the same
     outputs = as_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
     plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))

@@ -50,7 +50,7 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
     arm, task, target, near = goals
     solving = doubted.miss <= tol.SOLUTION**2
     moved = solving & (doubted.miss >= tol.CLOSED**2)
-    # what misses a little more may be a branch
+    # a candidate that misses by a little more may be a branch
     far = doubted.miss > np.where(doubted.edge, tol.SEED**2, tol.NEARBY**2)
     decided: Bool = np.asarray(doubted.plain & solving.any(axis=1) & (solving | far).all(axis=1))
     k, b = np.nonzero(moved & decided[:, None])
@@ -139,10 +139,10 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
         # the fourth derivative is taken for as large as that of the sharpest fold
         plain = _one_direction_lost(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
         alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURELY * tol.SOLUTION)
-        # as far as the residual of two that meet may be 2 SOLUTION
+        # up to where the residual of two branches that meet may be 2 SOLUTION
         end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
         straight = 6.0 * uneven / far**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
-        # and the direction that no joint moves the tool in
+        # the direction in which no joint moves the tool counts as well
         across = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
         meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURELY)
     return np.asarray(alone), np.asarray(meet)
@@ -152,7 +152,7 @@ def _isolated(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
     """Which weak postures (M, n), with no other close by, are isolated roots: g is too steep to turn before it passes
     `SOLUTION`."""
     n = q.shape[1]
-    # of J^-1 a column is nearly the lost direction v, that of the largest size the most
+    # the columns of J^-1 are nearly along the lost direction v, the longest one most of all
     moved = inverse[:, :n]
     largest = (moved * moved).sum(axis=1).argmax(axis=1)
     v = np.take_along_axis(moved, largest[:, None, None], axis=2)

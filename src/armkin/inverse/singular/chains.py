@@ -47,7 +47,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         link = stretch(arm, task, last, target[row], span[going])
         good = link.known & (link.second > tol.HIGH)
         span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
-        # `q` itself comes again, ahead, on a curve that closes
+        # a curve closes where it meets `q` itself again, in its own sense
         apart = newton.difference(arm, np.concatenate([peers[row], q[row, None]], axis=1), last[:, None])
         passed = members(link, rows, apart) & good[:, None]
         np.logical_or.at(inside, row, passed[:, :-1])

@@ -93,9 +93,9 @@ class _Groups:
         K, M, n = at.q.shape
         self.valid: Bool = np.asarray(at.size <= tol.SOLUTION)
         on_motion: Bool = np.asarray(at.sure.any(axis=2))
-        # where one direction alone is lost, joints that rest there and on a part of the self-motion rest on all of it
+        # where one direction alone is lost a joint that rests there and on a part of the self-motion rests on all of it
         self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < tol.SOLUTION)
-        # `near` speaks for its group, else the most exact: what lies between two branches must not make them one
+        # `near` leads its group, else the most exact candidate: one between two branches must not join them
         self.rank = np.maximum(at.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.open: Bool = self.valid & ~at.simple  # those of no group yet
@@ -265,7 +265,7 @@ class _Groups:
         arm, task, target, _ = self.goals
         q, joints = self.at.q, self.which[k, b]
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
-        # (two postures of it, each off by as much as a double root)
+        # two postures of one self-motion may each be off by as much as a double root
         moving = self.moves[k, b] & ~self.ended[k, b]  # of others all that is on them is one with them
         mine: Bool = moving[:, None] & (held < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION) & self.open[k]
         far = mine & ~group & (joints.sum(axis=1) > 2)[:, None]
@@ -300,7 +300,7 @@ class _Groups:
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
         arm, task, target, _ = self.goals
         q, sigma, chosen, every = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
-        # also beside a self-motion: a root of high order
+        # a root of high order may also lie beside a self-motion
         moving = np.asarray(self.curve.any(axis=2))
         beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)

@@ -51,7 +51,7 @@ def equal_candidates(
     if len(row):
         start = q[k[row], b[row]]
         way = newton.difference(arm, q[k[row], column], start)
-        # a pair's longer Newton step; of rounding alone the quotient says nothing
+        # the longer Newton step of each pair; where it is rounding alone the quotient says nothing
         first, second = (k[row], b[row]), (k[row], column)
         longer = size[second] * sigma[first] > size[first] * sigma[second]
         miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))

@@ -43,7 +43,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
             legal = exact[0]
         goal = np.repeat(target[k : k + 1], len(q) + 1, axis=0)
         miss, *listed = newton.misses(arm, task, np.concatenate([legal[None], q]), goal)
-        # of a self-motion as exact as what was listed; with a margin, for it has to be taken as a branch
+        # it must be as exact as what was listed, with a margin, as it is to count as a branch
         if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(listed), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
             continue
         beside = Goals(arm, task, target[k : k + 1], legal[None])
@@ -70,7 +70,7 @@ def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
     arm, task, target, _ = goals
     k, b = np.nonzero(batch.valid[rows])
     inside = _at_limits(arm, batch.q[rows[k], b])
-    # else a joint that is held is outside; or the curve is of small residuals, not as exact as the branches
+    # otherwise a held joint is outside its limits, or the curve is less exact than the branches
     open_ = np.flatnonzero((inside | batch.free[rows[k]]).all(axis=1))
     legal: Bool = np.asarray(inside.all(axis=1))
     open_ = open_[~legal[open_]]

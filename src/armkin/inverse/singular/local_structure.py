@@ -82,7 +82,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     w, full, short = np.zeros((M, n)), curve.span.copy(), np.zeros(M, bool)
     if rows == n > 1:
         w = _second_order(arm, task, q, target, r, U, S, V, curve)
-        # first as far as the component goes by the second order, and as far again
+        # the first span is twice as long as the component is by its second order
         ends = 2.0 * np.maximum(-curve.low, curve.high)
         short = ~curve.known & (ends > 0.0) & (2.0 * ends < full) & (curve.second > tol.HIGH)
         curve.span[short], w[~short] = ends[short], 0.0
@@ -91,7 +91,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
         if not len(left):
             break
         stays = _follow(arm, task, q, target, U, V, w, curve, left)
-        # where two directions are all but lost no shorter curve stays at hand; what leaves a span leaves shorter ones
+        # where two directions are all but lost no shorter span helps; what leaves a span leaves shorter ones
         left = left[~curve.known[left] & (curve.second[left] > tol.HIGH) & (short[left] | ~stays)]
         curve.span[left] = np.where(short[left], full[left], curve.span[left] / SHRINK)
         short[left], w[left] = False, 0.0
@@ -139,7 +139,7 @@ def _follow(
     n = q.shape[1]
     span, u = curve.span[rows], U[rows, :, n - 1 :]
     stays, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
-    # where another curve is near, that may be the one which Newton's method found
+    # Newton's method may have found another curve close by: then x(0) is not the posture
     stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (
         tol.SMOOTH * span + tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
     )
@@ -187,7 +187,7 @@ def _second_order(
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
         quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * off
         third = (6.0 * cubic + 12.0 * quartic) / h**3
-        # what lies beyond h decides nothing, and its product may be no number
+        # far and near beyond h decide nothing, and their products may overflow
         bends, leans = third * np.minimum(far, h), third * np.minimum(near, h)
         turns = (far <= h) & (bends < 0.2 * size) & (sigma**2 < 2.0 * tol.SOLUTION * (size - bends))
         alone = (near <= h) & (sigma**2 > 2.0 * tol.SOLUTION * (size + leans))
@@ -218,14 +218,14 @@ def _polynomials(
     """
     n, rows = q.shape[1], u.shape[1]
     on, x, along_u, inverse = _nodes(arm, task, q, target, u, v, w, span)
-    # the last rows of the inverse span what no motion across v reaches: u has turned on the way
+    # along the curve u turns: the inverse's last rows span what no motion across v reaches there
     g = _least_residual(inverse[:, :, n:, :rows], along_u)
     chebyshev = np.tensordot(_FIT, np.concatenate([x, g], axis=2), axes=1)
     # the polynomials are exact on the span if their last coefficients are small
     last = np.abs(chebyshev[-2:]).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         off = np.maximum(last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION))
-        # these grow with as high a power of the span
+        # the last coefficients grow with the span to that power
         longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LONGER), LONGER[0])
         on &= off < 1.0
     power = np.tensordot(_POWERS, chebyshev, axes=1)

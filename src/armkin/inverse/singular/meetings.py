@@ -139,7 +139,7 @@ def _steps_out(
     unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
     good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))
     good = good[newton.null_space(arm, task, postures[good], target[meeting[good]])[2] == 1]
-    # the way there is a self-motion's, too: half way it is beside the chord by no more than a curve is
+    # a posture is on a self-motion through the meeting if the middle of the way is no farther off it than a curve bows
     start = q[meeting[good]] + 0.5 * way[good] * unit
     between, size = pull_back(arm, task, start, target[meeting[good]])
     beside = np.abs(newton.difference(arm, between, start)).max(axis=1)

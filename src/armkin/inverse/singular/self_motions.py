@@ -93,11 +93,11 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
         return
     start, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
     same, size = linked[k, i, j], np.abs(apart)
-    # one may be where its own self-motion and the other meet
+    # one of the two postures may be where its own self-motion meets the other's
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
     thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
     held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= ALONG)
-    # a joint may move too slowly at one of the two alone to be called free there
+    # at one of the two postures a joint may move too slowly to be called free
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
     slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
     held |= np.equal(j, 0)  # `near` stands for all that meet there
@@ -187,7 +187,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     first = np.where(several, 10 * STEP, STEP)
     _, _, grown = push_along(arm, task, q[row], first, push, target[row])
     going = np.flatnonzero(grown <= tol.GROWTH)
-    # of those that lose one direction most do not stay on a longer way
+    # most of those that lose one direction fall back from a longer step
     alone = ~several[going] & (grown[going] * first[going] > tol.CLOSED)
     if alone.any():
         tried = going[alone]

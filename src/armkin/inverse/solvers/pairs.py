@@ -67,7 +67,7 @@ def settle_pairs(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bo
     q, guesses = np.full_like(seed, np.nan), np.full_like(seed, np.nan)
     better, size = newton.correct(arm, task, seed[row, place], target[row])
     q[row, place] = np.where((size <= tol.ANSWERED)[:, None], better, np.nan)
-    # what moves farther than half the way to its neighbour may not continue it
+    # a root that Newton's method moved more than half the way to its neighbour may be the neighbour's
     beside = (newton.distances(arm, seed, seed) + np.diag(np.full(seed.shape[1], np.inf))).min(axis=2)
     jumped = newton.wrapped_distance(arm, q, seed) > 0.5 * beside
     bad = (np.isnan(q[:, :, 0]) & tried) | jumped | _merged_branches(arm, q)

@@ -31,7 +31,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         solve = inner.pairs
 
         def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
-            # where the virtual joint is free, other values of the others' are other values of its own
+            # where the virtual joint is free the other joints' values give its own
             candidates = solve(pose_of(goal), [*prefer, prefer[4]])
             return candidates._replace(pairs=candidates.pairs[:5], angles=candidates.angles[:5])
 
