@@ -60,7 +60,7 @@ class Results:
         wide_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
         pairs = zip(narrow_arrays, wide_arrays, (math.nan, False, False, -1), strict=True)
         for narrow, wide, none in pairs:
-            # from the end: a row moves to where rows behind it have stood
+            # rows move from the end on: each goes to a place that rows behind it have left
             for start in reversed(range(0, self.N, BLOCK)):
                 rows = narrow[start : start + BLOCK].copy()
                 wide[start : start + BLOCK, :before] = rows

@@ -152,7 +152,7 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, sta
     order = np.argsort(np.abs(t - close), kind="stable")
     carried = order[lacking[0, order] == lacking.min()]
     if turned.keep_out and not turned.ignores_keep_out and len(carried) > 1:
-        # beside what must not be touched a proof is long: values that keep away from it come first
+        # near a keep-out a proof takes long: values that keep away from it come first
         margins = [0.0, AWAY * turned.reach]
         count = max(POSTURES // (len(carried) * len(ways)), 2)
         near = np.zeros((3, len(carried)), int)

@@ -36,7 +36,7 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stre
         return straight_move(arm, standing, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
         share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)
-        # Whole steps make a short way another one for some joints: they keep to their own limits there.
+        # On a short way whole steps change the share of some joints: there they keep to their own limits.
         fastest = straight_move(arm, standing, stretch.end).law
         top, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
         return Straight(standing, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)

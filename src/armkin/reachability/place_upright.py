@@ -97,7 +97,7 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     valid = np.concatenate([part.valid for part in parts], axis=1).reshape(-1, T, count)
     left = np.zeros(T * count, bool)
     left[np.concatenate([part.rows.start + part.left for part in parts])] = True
-    # nan, of a branch that is nowhere near, is neither sure nor out of the question: it is asked
+    # nan, of a branch that is nowhere near its target, is neither sure nor excluded: such cells are asked
     gap = np.sqrt(miss)
     never = _lesser_end(gap) > _cell_motion(gap) + apart / arm.reach
     sure = valid[..., :-1] & valid[..., 1:]

@@ -89,7 +89,7 @@ def carry_out(
                 raise
         session.reopen()
         run.begin_anew(left[1])
-        # a line of which it is known by now is given a bad one's lead, then four times that, and then the longest
+        # a line that has turned out bad gets the lead of a bad line, then four times that, and at last the longest
         least = min(max(LEAD_BAD, 4 * least), LEAD_MOST) if session.line.damaged else LEAD_MOST
         plans_left = chain(left[0], plans_left)
 

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-# each needs those before
+# each part needs those before it
 _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
 _NAMED = {  # numbers that the method reads, by the names that they have in Python
     name: getattr(tolerances, name)

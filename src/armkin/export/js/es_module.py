@@ -126,7 +126,7 @@ def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]
     n, entries = arm.n, arm_formulas.goal_size(task)
     declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
     for j in range(n):
-        # what is preferred for a joint is asked where that is free, and computed there
+        # a joint's preferred value is needed where the joint is free alone, and computed there
         preferred = [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
         declared += [(text, "") for text in preferred]
     recorded = arm_formulas.record_candidates(arm, task, geometry, measured=True)

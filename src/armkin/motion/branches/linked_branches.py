@@ -221,7 +221,7 @@ class _Linking:
             a, b = np.unravel_index(int(cost.argmin()), cost.shape)
             c.partner[i, left[a]] = right[b]
             cost[a, :], cost[:, b] = np.inf, np.inf
-        # What no copy has within the limits at either end carries nothing: nobody asks where it goes on.
+        # A branch without a copy within limits at either end carries nothing: where it goes on is not asked.
         alone, arriving = left[c.partner[i, left] < 0], np.setdiff1d(right, c.partner[i])
         self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, arriving].any()
         self.both[i] = self.torn[i] and len(alone) and len(arriving)

@@ -142,7 +142,7 @@ def plan_moves(
     check_rates(arm)
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
-    # What the motors make of the goals may be half a step outside the limits, which is within them to the board.
+    # In whole steps a goal may be half a step outside the limits: the board counts that as within them.
     made = np.clip(joints_of(arm, pulses(arm, goals)), arm.lower, arm.upper)
     trajectory = plan_joints(arm, joints_of(arm, np.asarray(start)), made, speed=speed)
     try:
