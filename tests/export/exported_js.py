@@ -113,7 +113,7 @@ def _one_each(arm: armkin.Arm, s: armkin.Solutions, k: int, python: np.ndarray, 
     """
     structure = local_structure(arm, s.task, python * arm.ratio, np.repeat(s.target[k][None], len(python), axis=0))
     way = difference(arm, theirs[None] * arm.ratio, python[:, None] * arm.ratio)
-    same = members(structure, np.arange(len(python)), way) | (
+    same = (structure.known[:, None] & members(structure, np.arange(len(python)), way)) | (
         np.abs(way).max(axis=2) < np.where(structure.known, 1e-7, 1e-4)[:, None]
     )
     return bool((same.sum(axis=0) >= 1).all() and (same.sum(axis=1) >= 1).all())

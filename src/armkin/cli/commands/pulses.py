@@ -130,10 +130,11 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     best_vectors = armkin.best_pulses(arm, q) if best else None
     rounded = armkin.rounding(arm, q) if best_vectors is None else best_vectors.rounded
     r = rounded if best_vectors is None else best_vectors.chosen
+    head = render.head(arm)
     of_all = {
-        "robot": arm.name,
-        "robot_file": arm.path,
-        "robot_sha256": arm.sha256,
+        "robot": head["robot"],
+        "robot_file": head["robot_file"],
+        "robot_sha256": head["robot_sha256"],
         "motors": motor_names(arm),
         "pulse_units": pulse_units(arm),
         "joint_units": units.unit_names(arm),

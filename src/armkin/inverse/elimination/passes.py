@@ -40,9 +40,7 @@ def run_pass(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     missed = ~good & ((seed.tilt < tol.UPRIGHT) | almost | seed.torn)
     touch = good & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     unsure = good & (seed.tilt > 0) & maybe
-    own_root = good & (shake == 0)
-    if shake == 0:
-        own_root = _own_roots(closed, pencil, target, seed, moved, good)
+    own_root = _own_roots(closed, pencil, target, seed, moved, good) if shake == 0 else np.zeros(len(good), bool)
     # A real root that was far from the answer it led to may have stood for another one, if it is not the answer's own.
     strayed = good & (seed.tilt == 0) & (moved.guess > tol.STRAY + 30 * shake) & ~own_root
     unsettled[seed.pose[missed | unsure | strayed]] = True

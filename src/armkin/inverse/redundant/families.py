@@ -68,11 +68,11 @@ def families(
     rows = _Rows(arm, free.joint, nears, stands)
     chunk = CIRCLES if srs else AT_ONCE // SAMPLES if free.by_formula else TRACED
     for k in range(0, len(goal), chunk):
-        some = goal[k : k + chunk], nears[k : k + chunk]
+        part = goal[k : k + chunk], nears[k : k + chunk]
         if srs:
-            rows.add(Turning.along(srs, *some))
+            rows.add(Turning.along(srs, *part))
             continue
-        follower = Follower(ik, arm, free, *some)
+        follower = Follower(ik, arm, free, *part)
         for curves in [Followed.along(follower)] if free.by_formula else trace_families(follower):
             rows.add(curves)
     rows.add_points(task, goal, not free.by_formula)

@@ -153,12 +153,8 @@ class _Curves:
     def _steps(self, ray: Int) -> tuple[list[tuple[Int, Points]], Points, Int]:
         """From halves (M,): the points passed on the way, of which rays; those on the plane at the end, and which, -1:
         lost."""
-        follower, j, unit, values = (
-            self.follower,
-            self.planes.guide.joint,
-            radian_or_reach(self.follower.arm),
-            self.planes.values,
-        )
+        follower, j, values = self.follower, self.planes.guide.joint, self.planes.values
+        unit = radian_or_reach(follower.arm)
         row, slab, current = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
         behind = (slab + 1) % self.planes.counts[row]
         low, h = values[row, slab], np.full(len(ray), LONGEST)

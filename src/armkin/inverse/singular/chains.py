@@ -1,6 +1,6 @@
-"""Self-motions longer than one polynomial holds: chains of these, each begun where the one before leaves its span.
+"""Components longer than one polynomial holds: chains of these, each begun where the one before leaves its span.
 
-A manifold on which the residual grows has two ends, where that passes `SOLUTION`. What lies between is known to be on
+A component on which the residual grows has two ends, where that passes `SOLUTION`. What lies between is known to be on
 it, and nothing else is.
 """
 
@@ -28,7 +28,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     """
     rows = np.arange(len(q))
     open_ = ~at.known & at.followed
-    inside = members(at._replace(known=at.known | open_), rows, newton.difference(arm, peers, q[:, None]))
+    inside = members(at, rows, newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
     open_ |= at.known & at.manifold & ~ended & (grown > tol.CLOSED)
@@ -45,7 +45,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
             break
         row, last, way, rows = curve[going], start[going], ahead[going], np.arange(len(going))
         link = stretch(arm, task, last, target[row], span[going])
-        good = link.known & (link.second > tol.HIGH)
+        good = link.followed & (link.second > tol.HIGH)
         span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
         # a curve closes where it meets `q` itself again, in its own sense
         apart = newton.difference(arm, np.concatenate([peers[row], q[row, None]], axis=1), last[:, None])

@@ -44,7 +44,7 @@ class Structure(NamedTuple):
     known: (M,) whether the curve was followed far enough to tell. manifold, boundary: (M,) what the component is, if
     neither, an isolated root. joints: (M, n) those that move along a manifold. low, high: (M,) ends of the component
     along v, at most `span` (M,) away, as far as the polynomials hold. least, most: (M, n) how far the joints' ways go
-    between these. followed: (M,) whether that is on all of the span. longer: (M,) how many times as long a span is
+    between these. followed: (M,) whether the polynomials hold so far. longer: (M,) how many times as long a span is
     likely to hold. alone: (M,) no other curve crosses within the span. v: (M, n). second: (M,) the second smallest
     singular value. x: (NODES, M, n) coefficients of the joints' ways [rad, reaches] in powers of t / span, g: (NODES,
     M, k) of the residual.
@@ -99,11 +99,11 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
 
 
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
-    """The curves through postures (M, n) as far as span (M,): known are those that stay at hand."""
+    """The curves through postures (M, n) as far as span (M,)."""
     linear = newton.Linear.at(arm, task, q, target)
     curve = _structure_of_jacobians(linear)
     curve.span[...] = span
-    curve.known[...] = _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))
+    _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))
     return curve
 
 
@@ -193,7 +193,7 @@ def _second_order(
         alone = (near <= h) & (sigma**2 > 2.0 * tol.SOLUTION * (size + leans))
         bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
         new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
-        out.known[new], out.boundary[new] = True, turns[new]
+        out.followed[new], out.known[new], out.boundary[new] = True, True, turns[new]
         may &= ~out.known
         more -= (inverse * rest[:, :, :-1, None]).sum(axis=2)
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
@@ -360,7 +360,7 @@ def members(structure: Structure, rows: Int, way: Array) -> Bool:
     x = _values(structure.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
     beside = np.abs(way - x).max(axis=2)
     inside = (t >= (structure.low[rows] - slack)[:, None]) & (t <= (structure.high[rows] + slack)[:, None])
-    return np.asarray(structure.known[rows, None] & inside & (beside <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
+    return np.asarray(structure.followed[rows, None] & inside & (beside <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
