@@ -190,9 +190,8 @@ class _Loop:
         ends, doubt = self.ends.solve(between, d, e, height, [prefer[j] for j in self.joints])
         P = pose.compose(pose.rotate(before, *ends[0]), self.ends.La)
         P = pose.compose(pose.rotate(P, *ends[1]), between)
-        P = pose.compose(
-            pose.rotate(P, *ends[2]), after
-        )  # joint `first` seen from the frame after the last of the three
+        # joint `first` seen from the frame after the last of the three
+        P = pose.compose(pose.rotate(P, *ends[2]), after)
         x, z = [P[0], P[3], P[6]], [P[2], P[5], P[8]]
         prefer3 = prefer[self.first : self.first + 3]
         if self.three_link is None:

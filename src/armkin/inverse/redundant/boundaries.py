@@ -209,7 +209,5 @@ def on_both_sides(angles: Array) -> Array:
     before = finite - np.concatenate([last[:, None], finite[:, :-1]], axis=1)
     following = np.concatenate([finite[:, 1:], first], axis=1)
     behind = np.where(np.arange(angles.shape[1]) == count[:, None] - 1, first, following) - finite
-    sides = np.concatenate(
-        [finite - np.minimum(before / 3, tol.BESIDE_END), finite + np.minimum(behind / 3, tol.BESIDE_END)], axis=1
-    )
-    return np.where(np.tile(real, 2), np.remainder(sides + np.pi, 2 * np.pi) - np.pi, np.inf)
+    sides = [finite - np.minimum(before / 3, tol.BESIDE_END), finite + np.minimum(behind / 3, tol.BESIDE_END)]
+    return np.where(np.tile(real, 2), np.remainder(np.hstack(sides) + np.pi, 2 * np.pi) - np.pi, np.inf)

@@ -85,12 +85,11 @@ class _Ends:
 
 def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:
     """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
-    near, far = (
-        margin(follower.arm, follower.own(changes.row, changes.branch, value + h)) for h in (0.0, tol.BESIDE_CROSSING)
-    )
+    h, own = tol.BESIDE_CROSSING, follower.own
+    near, far = (margin(follower.arm, own(changes.row, changes.branch, place)) for place in (value, value + h))
     with np.errstate(invalid="ignore", divide="ignore"):
-        step = near * tol.BESIDE_CROSSING / (near - far)
-        return np.asarray(np.where(np.abs(step) < tol.BESIDE_CROSSING, value + step, value))
+        step = near * h / (near - far)
+        return np.asarray(np.where(np.abs(step) < h, value + step, value))
 
 
 def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:

@@ -142,9 +142,8 @@ class OneTarget:
             for place, b in enumerate(solving):
                 q[place] = self._rows[b](legal)[:-1]
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in solving]
-        if at_near and all(
-            low - SLACK <= v <= high + SLACK for v, (low, high, _) in zip(near_numbers, self._joints, strict=True)
-        ):
+        limits = zip(near_numbers, self._joints, strict=True)
+        if at_near and all(low - SLACK <= v <= high + SLACK for v, (low, high, _) in limits):
             near_branch = self._beside(near_numbers, legal, solving)
             if near_branch is None:
                 return None

@@ -320,7 +320,7 @@ class _Groups:
         surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
         if len(k):
             lost = self.lost.V[k, b], self.lost.nullity[k, b]
-            surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])]] = True
+            surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])[0]]] = True
         listed = np.where(present[:, :, None], q[every, order], np.nan)
         label = np.where(present, self.at.label[every, order], OWN)
         moved = np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1))

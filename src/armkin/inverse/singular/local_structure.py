@@ -140,9 +140,8 @@ def _follow(
     span, u = curve.span[rows], U[rows, :, n - 1 :]
     stays, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
     # Newton's method may have found another curve close by: then x(0) is not the posture
-    stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (
-        tol.SMOOTH * span + tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
-    )
+    slack = tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
+    stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + slack)
     held, curve.longer[rows], curve.followed[rows] = rows[stays], longer, stays
     if len(held):
         curve.x[:, held], curve.g[:, held], curve.alone[held] = x[:, stays], g[:, stays], alone[stays]
@@ -261,7 +260,7 @@ def _nodes(
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # the next step is about as many times smaller than this as this one's square than the last one's
         done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
-        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0)
+        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0) & (size < span[going])
         on[going], before[going] = done & near, size
         going = going[~done & near]
         if not len(going):

@@ -25,6 +25,7 @@ from armkin.model.units import radian_or_reach
 BOW = 0.1  # of its length: a curve is no farther off its chord
 AROUND = 256  # directions in a plane, of which each stands for its opposite, too
 ACROSS = 64  # along the edges of a cube whose sides hold directions in space
+SAMPLE = 61  # one of so many of these is asked first: most curves have one below what all must exceed
 ALL_ROUND = 5.0 * tol.BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
 SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
@@ -75,6 +76,16 @@ def _directions(k: int) -> tuple[Array, Array, float]:
     return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)]), far
 
 
+def _sizes(forms: Array, products: Array, far: float) -> tuple[Array, Array]:
+    """Of forms (m, k, pairs) in directions, by their products (pairs, P): (m, P); and by which none is zero: (m,).
+
+    As far [rad] from the next of these directions a form differs by twice its largest value at most.
+    """
+    grown = forms @ products  # (m, k, P)
+    size = np.sqrt((grown * grown).sum(axis=1))
+    return size, ALL_ROUND + 2.0 * far * size.max(axis=1)
+
+
 def _tangents(
     arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array
 ) -> tuple[Bool, Int, Array]:
@@ -100,14 +111,16 @@ def _tangents(
         r = newton.residuals(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
         bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
         diag = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
-        forms = np.stack([b if i == j else b - diag[i] - diag[j] for b, (i, j) in zip(bent, pairs, strict=True)])
-        grown = forms.transpose(1, 2, 0) @ products  # (m, k, P)
-        size = np.sqrt((grown * grown).sum(axis=1))
-        # that far from the next of these directions a form differs by twice its largest value at most
-        least = ALL_ROUND + 2.0 * far * size.max(axis=1)
+        columns = [b if i == j else b - diag[i] - diag[j] for b, (i, j) in zip(bent, pairs, strict=True)]
+        forms = np.stack(columns, axis=2)  # (m, k, pairs)
         if k == 3:
-            decided[rows] = size.min(axis=1) > least
+            for some in (products[:, ::SAMPLE], products):
+                size, least = _sizes(forms, some, far)
+                none = size.min(axis=1) > least
+                rows, forms = rows[none], forms[none]
+            decided[rows] = True
             continue
+        size, least = _sizes(forms, products, far)
         decided[rows] = size.max(axis=1) > SPREAD * ALL_ROUND
         zero = (size <= least[:, None]) & decided[rows, None]
         zero &= (size <= np.roll(size, 1, axis=1)) & (size < np.roll(size, -1, axis=1))
@@ -127,14 +140,18 @@ def _steps_out(
     """
     decided, meeting, push = _tangents(arm, task, q, linear, nullity, target)
     rests, open_ = decided.copy(), np.flatnonzero(~decided)
-    rests[open_] = ~on_surface(arm, task, q[open_], linear.V[open_], nullity[open_], target[open_])
-    rows = open_[rests[open_]]
+    surface, row, pushed = on_surface(arm, task, q[open_], linear.V[open_], nullity[open_], target[open_])
+    rests[open_] = ~surface
+    three = np.flatnonzero(rests[open_[row]] & (nullity[open_[row]] > 2))  # pushed all ways they may go
+    rows = np.flatnonzero(rests & ~decided & (nullity < 3))
     if len(rows):
         more, further = null_directions(arm.n, linear.V[rows], nullity[rows])
         meeting, push = np.concatenate([meeting, rows[more]]), np.concatenate([push, further])
+    once = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
+    postures, size, grown = (np.concatenate([a, b[three]]) for a, b in zip(once, pushed, strict=True))
+    meeting = np.concatenate([meeting, open_[row[three]]])
     if not len(meeting):
-        return meeting, push, rests
-    postures, size, grown = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
+        return meeting, postures, rests
     rests[meeting[grown <= tol.GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
     good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))

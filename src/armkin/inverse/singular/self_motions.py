@@ -213,23 +213,26 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     return moving, joints
 
 
-def on_surface(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> Bool:
+def on_surface(
+    arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array
+) -> tuple[Bool, Int, tuple[Array, Array, Array]]:
     """Which postures (M, n) that lose two directions still do a long step off, by both ways at once: (M,).
 
     Those lie on a self-motion of two dimensions, or on one of double roots. V: (M, n, n) right singular vectors. Where
     more directions are lost surfaces meet, and rounding chooses the vectors: there any of `null_directions` tells.
+    Also whose the long steps are, and what `push_along` says of these.
     """
     two, more = np.flatnonzero(nullity < 3), np.flatnonzero(nullity > 2)
     row, push = two, V[two, arm.n - 1] + 0.7 * V[two, arm.n - 2]
     if len(more):
         more_rows, further = null_directions(arm.n, V[more], nullity[more])
         row, push = np.concatenate([row, more[more_rows]]), np.concatenate([push, further])
-    landed, size = pull_back(arm, task, q[row] + 10 * STEP * push * radian_or_reach(arm), target[row])
+    pushed = landed, size, _ = push_along(arm, task, q[row], np.full(len(row), 10 * STEP), push, target[row])
     lost = newton.null_space(arm, task, landed, target[row])[2]
     away = np.abs(newton.difference(arm, landed, q[row])).max(axis=1)
     surface = np.zeros(len(q), bool)
     np.logical_or.at(surface, row, (size <= tol.SOLUTION) & (lost > 1) & (away > 3 * STEP))
-    return surface
+    return surface, row, pushed
 
 
 def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
