@@ -79,3 +79,38 @@ def test_short_self_motions_are_told_without_python(arm: armkin.Arm, monkeypatch
     for answer, status, free in zip(map(fast.ik, target), expected.status, expected.free, strict=True):
         assert answer.status == status
         assert np.array_equal(answer.free, free)
+
+
+TWO_LOST = np.array([  # of a Puma whose elbow is nearly stretched
+    [1.833627481, -0.298707509, 1.614041128, -3.07493505, -3.128725599, 0.839968441],
+    [1.691701213, -1.834821819, 1.617818475, 2.411774408, -1.579850503, 2.36898957],
+    [-2.563827713, -2.841684122, 1.617580845, 1.359001904, 0.003659863, -0.62104233],
+    [-0.479825434, 1.17897984, 1.618291834, 2.490298158, 0.052058941, -2.1017677],
+    [1.259519517, -2.421425033, 1.618983246, -0.667494987, 0.148093191, -1.374188837],
+    [-2.040234652, 1.687193849, 1.61764349, -0.042181822, -2.593692599, 2.413136733],
+    [2.435535184, 1.364725771, 1.617775426, 2.949187502, -2.890688097, -1.428557164],
+])  # fmt: skip
+
+
+def test_components_longer_than_a_span_are_told_without_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = armkin.load("puma560")
+    fast, target = armkin.compile(arm), armkin.fk(arm, TWO_LOST)
+    expected = armkin.ik(arm, target)
+    left = left_to_python(monkeypatch)
+    solutions = fast.ik(target)
+    assert sum(left) <= 1
+    for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
+        assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
+    np.testing.assert_allclose(solutions.q, expected.q, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["puma560", "thor", "ar4"])
+def test_postures_beside_round_ones_are_what_python_says(name: str) -> None:
+    """Joints at multiples of 45 degrees, off by 1e-9 to 0.03 rad, where two singularities meet most often."""
+    arm, rng = armkin.load(name), np.random.default_rng(1)
+    q = rng.uniform(-np.pi, np.pi, (3000, arm.n))
+    beside = np.round(q / (np.pi / 4)) * (np.pi / 4) + 10.0 ** rng.uniform(-9.0, -1.5, q.shape)
+    target = armkin.fk(arm, np.where(rng.random(q.shape) < 0.5, beside, q))
+    expected, solutions = armkin.ik(arm, target), armkin.compile(arm).ik(target)
+    for field in ("status", "valid", "free", "complete"):
+        assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field

@@ -15,6 +15,7 @@ from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     CLOSE_BY,
     CLOSED,
+    DRIFT,
     FAR,
     FOLD_WAY,
     FOLDED,
@@ -27,9 +28,10 @@ from armkin.inverse.numeric.tolerances import (
     SOLUTION,
     THERE,
     TINY,
+    TURNED,
     WEAK,
 )
-from armkin.inverse.singular import local_structure
+from armkin.inverse.singular import chains, local_structure, self_motions
 from armkin.inverse.singular.near_itself import COARSE, ROOM
 from armkin.inverse.tasks.task import LARGEST
 from armkin.model.limits import SLACK
@@ -44,7 +46,6 @@ PARTS = Path(__file__).parent / "parts"
 
 
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
-LONGER = 2  # times that a self-motion which leaves its span is asked for one twice as long
 BLOCK = 8  # poses at once of an elimination: a multiple of its vectors' lanes
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_equal_roots", "lanes_pass")
 
@@ -154,7 +155,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
         "close_by": CLOSE_BY, "smooth": SMOOTH, "wide": REACH, "way": FOLD_WAY,
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "high": HIGH,
-        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME,
+        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED, "drift": DRIFT,
     }  # fmt: skip
     named = {name: number_text(value) for name, value in values.items()}
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
@@ -164,7 +165,13 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
     named |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
-    named |= {"nodes_count": str(local_structure.NODES), "longer": str(LONGER)}
+    named |= {
+        "nodes_count": str(local_structure.NODES),
+        "links": str(chains.LINKS),
+        "few_links": str(chains.FEW_LINKS),
+        "along": str(self_motions.ALONG),
+    }
+    named |= dict(zip(("shorter", "longer"), map(number_text, local_structure.LONGER), strict=True))
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
     named["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
     named["sums"] = str(len(sums))

@@ -33,7 +33,7 @@ ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, cons
     double M[ARM_JOINTS + 1][2 * (ARM_JOINTS + 1)] = {{0.0}}, r[ARM_JOINTS + 1];
     double longest = 0.0, across = 0.0, left = 0.0, norm = 0.0;
     int j, k;
-    arm_residual(T, goal, q, ARM_POINTS, r);
+    arm_residual(T, goal, q, r);
     for (r[n] = t, k = 0; k < n; k++) {
         r[n] -= v[k] * away[k];
         M[k][n] = u[k], M[n][k] = v[k];
@@ -69,8 +69,9 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
     static const double unit[ARM_JOINTS] = {@unit@}, node[ARM_NODES] = {@nodes@};
     static const double fit[ARM_NODES][ARM_NODES] = {@fit@}, last[2][ARM_NODES] = {@last@};
     double away[ARM_NODES][ARM_JOINTS + 1], at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS];
-    double regular[ARM_NODES], steepest = 0.0;
+    double regular[ARM_NODES], steepest = 0.0, off = 0.0;
     int i, j, k, round, there[ARM_NODES] = {0}, open = ARM_NODES;
+    out->longer = @shorter@;
     for (i = 0; i < ARM_NODES; i++)
         for (j = 0; j < ARM_JOINTS; j++) {
             const double t = node[i] * out->span;
@@ -79,7 +80,7 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
     for (round = 0; open && round < @iterations@; round++) {
         for (i = 0; i < ARM_NODES; i++)
             for (j = 0; j < ARM_JOINTS; j++)
-                at[j * ARM_POINTS + i] = q[j * ARM_LANES] + away[i][j] * unit[j];
+                at[j * ARM_POINTS + i] = q[j * ARM_POINTS] + away[i][j] * unit[j];
         arm_pose(at, T, ARM_NODES);
         arm_slope(at, slope, ARM_NODES);
         for (i = 0; i < ARM_NODES; i++) {
@@ -94,15 +95,21 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
                     return 0;
         }
     }
+    if (open)
+        return 0;
     for (j = 0; j <= ARM_JOINTS; j++) {
         const double most = j < ARM_JOINTS ? @smooth@ * out->span : 0.01 * @solution@;
         for (k = 0; k < 2; k++) {
             double c = 0.0;
             for (i = 0; i < ARM_NODES; i++)
                 c += last[k][i] * away[i][j];
-            if (open || !(fabs(c) < most)) /* the polynomials are exact on the span if their last coefficients are small */
-                return 0;
+            off = fmax(off, fabs(c) / most);
         }
+    }
+    out->longer = fmin(fmax(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @shorter@), @longer@);
+    if (!(off < 1.0)) /* the polynomials are exact on the span if their last coefficients are small */
+        return 0;
+    for (j = 0; j <= ARM_JOINTS; j++) {
         for (k = 0; k < ARM_NODES; k++) {
             double c = 0.0;
             for (i = 0; i < ARM_NODES; i++)
@@ -132,12 +139,23 @@ ARM_SELDOM static double arm_value(const double *g, int step, double s, double *
     return value;
 }
 
-/* What the polynomials tell: 1 if the component ends both ways within the span, 0 if not, -1 if it is a self-motion that
-   does not; `_decide`. */
+/* Which joints move along a component whose ends are far enough apart, and how far the one that goes farthest does. */
+ARM_SELDOM static double arm_moving(arm_branch *out)
+{
+    double widest = 0.0;
+    int j;
+    for (j = 0; j < ARM_JOINTS; j++)
+        widest = fmax(widest, out->most[j] - out->least[j]);
+    for (j = 0; j < ARM_JOINTS; j++)
+        out->moves[j] = widest >= @wide@ && out->most[j] - out->least[j] > @moved@ * widest;
+    return widest;
+}
+
+/* What the polynomials tell, and whether the component ends both ways within the span: `_decide`. */
 ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
 {
     static const double point[@points_count@] = {@points@};
-    double ends[2] = {1.0, 1.0}, rise[@fine@], steepest = 0.0, extent[ARM_JOINTS], widest = 0.0;
+    double ends[2] = {1.0, 1.0}, rise[@fine@], steepest = 0.0;
     int i, j, k, way, over[2] = {0, 0};
     for (way = 0; way < 2; way++)
         for (i = 1; !over[way] && i < @points_count@; i++)
@@ -150,16 +168,13 @@ ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
                 ends[way] = low;
             }
     for (j = 0; j < ARM_JOINTS; j++) {
-        double least = INFINITY, most = -INFINITY;
+        out->least[j] = INFINITY, out->most[j] = -INFINITY;
         for (i = 0; i < @fine@; i++) {
             const double x = arm_value(&out->x[0][j], ARM_JOINTS, -ends[0] + i * (ends[0] + ends[1]) / (@fine@ - 1), 0);
-            least = fmin(least, x), most = fmax(most, x);
+            out->least[j] = fmin(out->least[j], x), out->most[j] = fmax(out->most[j], x);
         }
-        extent[j] = most - least, widest = fmax(widest, extent[j]);
     }
-    for (j = 0; j < ARM_JOINTS; j++)
-        out->moves[j] = widest >= @wide@ && extent[j] > @moved@ * widest;
-    out->motion = widest >= @wide@;
+    out->motion = arm_moving(out) >= @wide@;
     for (i = 0; i < @fine@; i++) {
         arm_value(g, 1, -ends[0] + i * (ends[0] + ends[1]) / (@fine@ - 1), rise + i);
         steepest = fabs(rise[i]) > fabs(steepest) ? rise[i] : steepest;
@@ -168,28 +183,106 @@ ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
         out->turns |= (steepest < 0.0 ? -rise[i] : rise[i]) / out->span <= @solution@;
     out->low = -ends[0] * out->span, out->high = ends[1] * out->span;
     out->turns &= !out->motion;
-    return over[0] && over[1] ? 1 : -out->motion;
+    return over[0] && over[1];
+}
+
+/* Where a branch's curve leaves its span, that way: q, and the way there. 0 if it ends before. */
+ARM_SELDOM static int arm_leaves(const arm_branch *one, const double *from, int way, double *q, double *ahead)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    int j;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        const double end = arm_value(&one->x[0][j], ARM_JOINTS, way, 0);
+        q[j * ARM_POINTS] = from[j * ARM_POINTS] + end * unit[j];
+        ahead[j] = end - arm_value(&one->x[0][j], ARM_JOINTS, 0.9 * way, 0);
+    }
+    return (way > 0 ? one->high : -one->low) >= one->span;
+}
+
+/* A further curve of branch self's component, begun where the one before left its span, and what it adds to out, which began
+   at `at`. 1 if the component ends on it, 0 if it goes on, -1 if nothing more can be told of it. */
+ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, int self, double *q, double *ahead, double *span,
+    arm_branch *out)
+{
+    static const double straight[ARM_JOINTS] = {0.0};
+    double T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], g[ARM_NODES], way[ARM_JOINTS], sense[2] = {0.0, 0.0};
+    double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS];
+    const int last = ARM_JOINTS - 1;
+    arm_branch link;
+    int b, j, home, good;
+    arm_pose(q, T, 1);
+    arm_slope(q, slope, 1);
+    arm_singular_values(slope, A, V, S);
+    link.span = *span, link.second = S[last - 1];
+    if (!(link.second > @high@) || !(S[last] > 0.0))
+        return -1;
+    for (j = 0; j < ARM_JOINTS; j++)
+        link.v[j] = V[last][j];
+    good = arm_polynomials(q, goal, A[last], straight, &link, g);
+    *span *= good ? link.longer : fmin(link.longer, 0.5);
+    if (!good)
+        return 0;
+    arm_decided(g, &link);
+    for (home = b = 0; b < count; b++) {
+        arm_way(at + b, q, way);
+        if (arm_member(&link, way))
+            home |= b == self, out->on[b] |= b != self;
+    }
+    arm_way(at + self, q, way);
+    for (j = 0; j < ARM_JOINTS; j++) { /* it closes where it meets the posture again in its own sense */
+        sense[0] += way[j] * link.v[j], sense[1] += ahead[j] * link.v[j];
+        out->least[j] = fmin(out->least[j], link.least[j] - way[j]), out->most[j] = fmax(out->most[j], link.most[j] - way[j]);
+    }
+    out->alone &= link.alone, out->turns |= link.turns;
+    good = arm_leaves(&link, q, sense[1] > 0.0 ? 1 : -1, q, ahead);
+    return !good || (home && sense[0] * sense[1] > 0.0);
+}
+
+/* A component that leaves its span, followed both ways in turn until it ends, or closes; farther if it is known that it is a
+   self-motion: `chains.follow`. 1 if both of its ends are known. */
+ARM_SELDOM static int arm_chained(const double *goal, const double *at, int count, int self, arm_branch *out)
+{
+    double q[2][ARM_JOINTS * ARM_POINTS], ahead[2][ARM_JOINTS], span[2];
+    int links, side, ended[2];
+    for (side = 0; side < 2; side++) {
+        span[side] = out->longer * out->span;
+        ended[side] = !arm_leaves(out, at + self, side ? -1 : 1, q[side], ahead[side]);
+    }
+    for (links = 1; links <= (out->motion ? @links@ : @few_links@) && !(ended[0] && ended[1]); links++) {
+        for (side = 0; side < 2; side++) {
+            if (!ended[side])
+                ended[side] = arm_link(goal, at, count, self, q[side], ahead[side], span + side, out);
+            if (ended[side] < 0)
+                return 0;
+        }
+        out->partial |= !out->motion && !(ended[0] && ended[1]);
+        out->motion = arm_moving(out) >= @wide@;
+        out->partial &= out->motion;
+    }
+    out->turns &= !out->motion;
+    return ended[0] && ended[1];
 }
 
 /* A branch that the curvature does not tell: followed first twice as far as that lets it go, then as `local_structure` does. */
-ARM_SELDOM static int arm_followed(const double *q, const double *goal, const double *u, arm_branch *out)
+ARM_SELDOM static int arm_followed(const double *at, int count, int self, const double *goal, const double *u, arm_branch *out)
 {
     static const double straight[ARM_JOINTS] = {0.0};
     const double whole = out->span, ends = 2.0 * fmax(-out->low, out->high);
-    int tries, longer = 0, near = ends > 0.0 && 2.0 * ends < whole && out->second > @high@;
+    double grown = 0.0;
+    int k, tries, near = ends > 0.0 && 2.0 * ends < whole && out->second > @high@;
     out->span = near ? ends : whole;
-    for (tries = 0; tries < @shrinks@ + 2 + longer; tries++) {
+    for (tries = 0; tries < @shrinks@ + 2; tries++) {
         double g[ARM_NODES];
-        const int on = arm_polynomials(q, goal, u, near ? out->w : straight, out, g);
-        const int told = on ? arm_decided(g, out) : 0;
-        if (told < 0 && longer < @longer@) { /* Python goes on with further curves */
-            near = 0, longer++, out->span *= 2.0;
-            continue;
-        }
-        if (told || longer)
-            return told > 0;
-        if (!(out->second > @high@) || !(near || !on))
+        const int on = arm_polynomials(at + self, goal, u, near ? out->w : straight, out, g);
+        if (on && arm_decided(g, out))
+            return 1;
+        if (!(out->second > @high@))
             return 0;
+        if (on && (out->motion || !near)) {
+            for (k = 0; k < ARM_NODES; k++)
+                grown += fabs(g[k]);
+            return (!out->motion || grown > @closed@) && arm_chained(goal, at, count, self, out);
+        }
         out->span = near ? whole : out->span / @shrink@;
         near = 0;
     }

@@ -3,11 +3,13 @@
    are left to Python. */
 enum { ARM_NODES = @nodes_count@ };
 
-/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. motion: whether it is a self-motion,
-   moves: of which joints, alone: no other curve crosses it. */
+/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. longer: times as long a span is likely to
+   hold. least, most: how far the joints' ways go. motion: whether it is a self-motion, moves: of which joints, alone: no other
+   curve crosses it, partial: Python does not follow it to its ends, on: which other branches lie on further curves of it. */
 typedef struct {
-    double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, second, miss;
-    int weak, turns, motion, moves[ARM_JOINTS], alone;
+    double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, longer, sigma, second, miss;
+    double least[ARM_JOINTS], most[ARM_JOINTS];
+    int weak, turns, motion, moves[ARM_JOINTS], alone, partial, on[ARM_BRANCHES];
 } arm_branch;
 
 #if @sums@
@@ -15,12 +17,12 @@ typedef struct {
 static const double arm_sums[@sums@][ARM_JOINTS + 1] = {@weights@};
 #endif
 
-/* What a pose (16 numbers) at joint values q, so far apart, misses of a target: lengths in reaches, then sums of joints or
+/* What a pose (16 numbers) at joint values q misses of a target: lengths in reaches, then sums of joints or
    the rotation vector [rad]. */
-ARM_SELDOM static void arm_residual(const double *T, const double *goal, const double *q, int apart, double *r)
+ARM_SELDOM static void arm_residual(const double *T, const double *goal, const double *q, double *r)
 {
     int k;
-    (void)q, (void)apart;
+    (void)q;
     for (k = 0; k < @position@; k++)
         r[k] = (goal[(@first@ + k) * ARM_LANES] - T[(4 * k + 3) * ARM_POINTS]) / @reach@;
 #if @sums@
@@ -28,7 +30,7 @@ ARM_SELDOM static void arm_residual(const double *T, const double *goal, const d
         double angle = goal[(@position@ + k) * ARM_LANES] - arm_sums[k][ARM_JOINTS];
         int j;
         for (j = 0; j < ARM_JOINTS; j++)
-            angle -= arm_sums[k][j] * q[j * apart];
+            angle -= arm_sums[k][j] * q[j * ARM_POINTS];
         r[@position@ + k] = angle - ARM_TURN * rint(angle / ARM_TURN);
     }
 #endif
@@ -64,13 +66,16 @@ ARM_SELDOM static double arm_entry(const double *slope, int k, int j)
     return slope[(k * ARM_JOINTS + j) * ARM_POINTS] * unit[j] / (k < @position@ ? @reach@ : 1.0);
 }
 
-/* One-sided Jacobi rotations (Hestenes 1958): the columns of A become those of U S, V those of the right vectors. */
-ARM_SELDOM static void arm_singular_values(double A[ARM_JOINTS][ARM_JOINTS], double V[ARM_JOINTS][ARM_JOINTS], double *S)
+/* One-sided Jacobi rotations (Hestenes 1958) of a Jacobian as `arm_slope` leaves it: rows of U and V are its left and right
+   vectors, the two of the smallest singular values S last. */
+ARM_SELDOM static void arm_singular_values(const double *slope, double A[ARM_JOINTS][ARM_JOINTS],
+    double V[ARM_JOINTS][ARM_JOINTS], double *S)
 {
-    int a, b, k, sweep, turned = 1;
+    int a, b, k, place, sweep, turned = 1;
+    double swap;
     for (a = 0; a < ARM_JOINTS; a++)
         for (b = 0; b < ARM_JOINTS; b++)
-            V[a][b] = a == b;
+            V[a][b] = a == b, A[a][b] = arm_entry(slope, b, a);
     for (sweep = 0; turned && sweep < 40; sweep++)
         for (turned = 0, a = 0; a < ARM_JOINTS; a++)
             for (b = a + 1; b < ARM_JOINTS; b++) {
@@ -94,6 +99,18 @@ ARM_SELDOM static void arm_singular_values(double A[ARM_JOINTS][ARM_JOINTS], dou
             S[a] += A[a][k] * A[a][k];
         S[a] = sqrt(S[a]);
     }
+    for (place = ARM_JOINTS - 1; place >= ARM_JOINTS - 2; place--) {
+        for (a = 0, k = 1; k <= place; k++)
+            a = S[k] < S[a] ? k : a;
+        swap = S[a], S[a] = S[place], S[place] = swap;
+        for (k = 0; k < ARM_JOINTS; k++) {
+            swap = A[a][k], A[a][k] = A[place][k], A[place][k] = swap;
+            swap = V[a][k], V[a][k] = V[place][k], V[place][k] = swap;
+        }
+    }
+    for (a = 0; a < ARM_JOINTS; a++)
+        for (k = 0; k < ARM_JOINTS; k++)
+            A[a][k] /= S[a];
 }
 
 /* A posture's way f = r - r(q + away), both ways, along the columns of U. */
@@ -105,10 +122,10 @@ ARM_SELDOM static void arm_both_ways(const double *q, const double *goal, const 
     int i, j, k;
     for (i = 0; i < 2; i++)
         for (j = 0; j < ARM_JOINTS; j++)
-            at[j * ARM_POINTS + i] = q[j * ARM_LANES] + away[i][j] * unit[j];
+            at[j * ARM_POINTS + i] = q[j * ARM_POINTS] + away[i][j] * unit[j];
     arm_pose(at, T, 2);
     for (i = 0; i < 2; i++) {
-        arm_residual(T + i, goal, at + i, ARM_POINTS, missed);
+        arm_residual(T + i, goal, at + i, missed);
         for (j = 0; j < ARM_JOINTS; j++)
             for (f[i][j] = 0.0, k = 0; k < ARM_JOINTS; k++)
                 f[i][j] += (r[k] - missed[k]) * U[j][k];
@@ -176,44 +193,6 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
     return told;
 }
 
-@followed@/* Whether a branch is told; slope: its `arm_slope`, T: its pose. */
-ARM_SELDOM static int arm_told(const double *q, const double *goal, const double *T, const double *slope, arm_branch *out)
-{
-    double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS], swap;
-    int a, k, j, place, told, last = ARM_JOINTS - 1;
-    arm_residual(T, goal, q, ARM_LANES, r);
-    for (out->miss = 0.0, k = 0; k < ARM_JOINTS; k++) {
-        out->miss += r[k] * r[k];
-        for (j = 0; j < ARM_JOINTS; j++)
-            A[j][k] = arm_entry(slope, k, j);
-    }
-    out->miss = sqrt(out->miss);
-    if (!(out->miss < @closed@)) /* a branch that misses by more wants a correction */
-        return 0;
-    arm_singular_values(A, V, S);
-    for (place = last; place >= last - 1; place--) { /* the two smallest last */
-        for (a = 0, k = 1; k <= place; k++)
-            a = S[k] < S[a] ? k : a;
-        swap = S[a], S[a] = S[place], S[place] = swap;
-        for (k = 0; k < ARM_JOINTS; k++) {
-            swap = A[a][k], A[a][k] = A[place][k], A[place][k] = swap;
-            swap = V[a][k], V[a][k] = V[place][k], V[place][k] = swap;
-        }
-    }
-    out->weak = S[last] < @folded@, out->turns = out->motion = 0, out->second = S[last - 1];
-    if (!out->weak)
-        return 1;
-    if (!(S[last - 1] > @lost@)) /* two directions are lost */
-        return 0;
-    if (@sums@ && !(S[last] > @solution@)) /* where sums of joints are taken off, rounding parts a double root another way */
-        return 0;
-    for (a = 0; a < ARM_JOINTS; a++)
-        for (k = 0; k < ARM_JOINTS; k++)
-            A[a][k] /= S[a];
-    told = arm_second_order(q, goal, r, A, V, S, out) || arm_followed(q, goal, A[last], out);
-    return told && (!out->motion || S[last] > @solution@);
-}
-
 /* Whether a posture that far away [rad, reaches] lies on a weak branch's component: `members` in Python. */
 static int arm_member(const arm_branch *one, const double *way)
 {
@@ -235,6 +214,45 @@ static int arm_member(const arm_branch *one, const double *way)
     return 1;
 }
 
+/* The way from one posture to another [rad, reaches], modulo whole turns, and how far the joint goes that goes farthest. */
+ARM_SELDOM static double arm_way(const double *to, const double *from, double *way)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    static const int slides[ARM_JOINTS] = {@slides@};
+    double away = 0.0;
+    int j;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        way[j] = to[j * ARM_POINTS] - from[j * ARM_POINTS];
+        way[j] = slides[j] ? way[j] / unit[j] : way[j] - ARM_TURN * rint(way[j] / ARM_TURN);
+        away = fmax(away, fabs(way[j]));
+    }
+    return away;
+}
+
+@followed@/* Whether the branch at + self is told; slope: its `arm_slope`, T: its pose; at: all count branches. */
+ARM_SELDOM static int arm_told(const double *at, int count, int self, const double *goal, const double *T, const double *slope,
+    arm_branch *out)
+{
+    double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS];
+    int k, last = ARM_JOINTS - 1;
+    arm_residual(T, goal, at + self, r);
+    for (out->miss = 0.0, k = 0; k < ARM_JOINTS; k++)
+        out->miss += r[k] * r[k];
+    out->miss = sqrt(out->miss);
+    memset(out->on, 0, sizeof out->on);
+    if (!(out->miss < @closed@)) /* a branch that misses by more wants a correction */
+        return 0;
+    arm_singular_values(slope, A, V, S);
+    out->weak = S[last] < @folded@, out->turns = out->motion = out->partial = 0, out->sigma = S[last], out->second = S[last - 1];
+    if (!out->weak)
+        return 1;
+    if (!(S[last - 1] > @lost@)) /* two directions are lost */
+        return 0;
+    if (@sums@ && !(S[last] > @solution@)) /* where sums of joints are taken off, rounding parts a double root another way */
+        return 0;
+    return arm_second_order(at + self, goal, r, A, V, S, out) || arm_followed(at, count, self, goal, A[last], out);
+}
+
 /* How far joint values are from `near`, modulo whole turns [rad, reaches]. */
 ARM_SELDOM static double arm_motion(const double *q, const double *near)
 {
@@ -249,30 +267,41 @@ ARM_SELDOM static double arm_motion(const double *q, const double *near)
     return sum;
 }
 
+/* Whether a branch off a self-motion may be one with it, or a part of it, for `drop_contained` and `drop_twins` in Python. */
+ARM_SELDOM static int arm_doubted(const arm_branch *motion, const arm_branch *other, const double *way)
+{
+    double held = 0.0;
+    int j, moving = 0, differing = 0, alike = 1, more = 0;
+    for (j = 0; j < ARM_JOINTS; j++) {
+        moving += motion->moves[j], differing += fabs(way[j]) > @turned@;
+        held = fmax(held, motion->moves[j] ? 0.0 : fabs(way[j]));
+        alike &= !motion->moves[j] || other->moves[j], more |= other->moves[j] && !motion->moves[j];
+    }
+    if (!other->motion)
+        return other->weak && other->sigma < @high@ && moving <= ARM_JOINTS / 2 && held < @close_by@;
+    if (motion->sigma < @solution@ && alike && more)
+        return 1;
+    return (motion->partial || other->partial) && held < @drift@ && (held > @turned@ || differing <= @along@);
+}
+
 /* Which branch is on the component of each of some: twin, -1 where there is none. 0 if that is left open. */
 ARM_SELDOM static int arm_twins(const arm_branch *one, const double *at, int count, int *twin)
 {
-    static const double unit[ARM_JOINTS] = {@unit@};
-    static const int slides[ARM_JOINTS] = {@slides@};
     double way[ARM_JOINTS];
     int a, b, j;
     for (a = 0; a < count; a++)
         for (twin[a] = -1, b = 0; b < count; b++) {
-            double away = 0.0;
-            for (j = 0; j < ARM_JOINTS; j++) {
-                way[j] = at[j * ARM_POINTS + b] - at[j * ARM_POINTS + a];
-                way[j] = slides[j] ? way[j] / unit[j] : way[j] - ARM_TURN * rint(way[j] / ARM_TURN);
-                away = fmax(away, fabs(way[j]));
-            }
+            const double away = arm_way(at + b, at + a, way);
             if (a == b || (!one[a].weak && !(away < @close_by@)))
                 continue;
             if (away < @close_by@ && (!one[a].weak || !one[b].weak))
                 return 0;
-            if (arm_member(one + a, way)) {
+            if (one[a].on[b] || arm_member(one + a, way)) {
                 if (twin[a] >= 0)
                     return 0;
                 twin[a] = b;
-            }
+            } else if (one[a].motion && arm_doubted(one + a, one + b, way))
+                return 0;
         }
     for (a = 0; a < count; a++)
         if ((b = twin[a]) >= 0) {
@@ -310,7 +339,7 @@ ARM_SELDOM static int arm_folds(const double *goal, const double *q, const doubl
     arm_pose(at, T, count);
     arm_slope(at, slope, count);
     for (a = 0; a < count; a++) {
-        if (!arm_told(q + which[a] * ARM_JOINTS * ARM_LANES, goal, T + a, slope + a, one + a))
+        if (!arm_told(at, count, a, goal, T + a, slope + a, one + a))
             return -1;
         if (one[a].motion && !(one[a].alone && one[a].second > @high@ && @motions@))
             return -1;
