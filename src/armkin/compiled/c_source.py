@@ -15,7 +15,7 @@ from armkin.inverse.numeric.tolerances import (
     ARRIVED,
     CLOSE_BY,
     CLOSED,
-    DRIFT,
+    ERROR,
     FAR,
     FOLD_WAY,
     FOLDED,
@@ -154,8 +154,8 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     values = {
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
         "close_by": CLOSE_BY, "smooth": SMOOTH, "wide": REACH, "way": FOLD_WAY,
-        "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "high": HIGH,
-        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED, "drift": DRIFT,
+        "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "error": ERROR, "high": HIGH,
+        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED,
     }  # fmt: skip
     named = {name: number_text(value) for name, value in values.items()}
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it

@@ -69,7 +69,7 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
     static const double unit[ARM_JOINTS] = {@unit@}, node[ARM_NODES] = {@nodes@};
     static const double fit[ARM_NODES][ARM_NODES] = {@fit@}, last[2][ARM_NODES] = {@last@};
     double away[ARM_NODES][ARM_JOINTS + 1], at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS];
-    double regular[ARM_NODES], steepest = 0.0, off = 0.0;
+    double regular[ARM_NODES], before[ARM_NODES] = {0.0}, step, steepest = 0.0, off = 0.0;
     int i, j, k, round, there[ARM_NODES] = {0}, open = ARM_NODES;
     out->longer = @shorter@;
     for (i = 0; i < ARM_NODES; i++)
@@ -87,9 +87,10 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             const double t = node[i] * out->span;
             if (there[i])
                 continue;
-            there[i] = arm_to_curve(T + i, slope + i, goal, at + i, u, out->v, t, away[i], &away[i][ARM_JOINTS], regular + i)
-                < @arrived@;
-            open -= there[i];
+            step = arm_to_curve(T + i, slope + i, goal, at + i, u, out->v, t, away[i], &away[i][ARM_JOINTS], regular + i);
+            /* the next step is about as many times smaller than this as this one's square than the last one's */
+            there[i] = step < @arrived@ || step * step * step < @error@ * before[i] * before[i];
+            open -= there[i], before[i] = step;
             for (j = 0; j < ARM_JOINTS; j++)
                 if (!(fabs(away[i][j]) < 3.0 * fabs(t)))
                     return 0;
@@ -225,8 +226,11 @@ ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, 
     arm_decided(g, &link);
     for (home = b = 0; b < count; b++) {
         arm_way(at + b, q, way);
-        if (arm_member(&link, way))
-            home |= b == self, out->on[b] |= b != self;
+        if (!arm_member(&link, way))
+            continue;
+        if (out->partial && b != self && !out->on[b]) /* Python may list both */
+            return -1;
+        home |= b == self, out->on[b] |= b != self;
     }
     arm_way(at + self, q, way);
     for (j = 0; j < ARM_JOINTS; j++) { /* it closes where it meets the posture again in its own sense */
@@ -255,10 +259,13 @@ ARM_SELDOM static int arm_chained(const double *goal, const double *at, int coun
             if (ended[side] < 0)
                 return 0;
         }
-        out->partial |= !out->motion && !(ended[0] && ended[1]);
-        out->motion = arm_moving(out) >= @wide@;
-        out->partial &= out->motion;
+        if (!out->motion) {
+            out->motion = arm_moving(out) >= @wide@;
+            out->partial = out->motion && !(ended[0] && ended[1]);
+        }
     }
+    if (!out->partial)
+        arm_moving(out);
     out->turns &= !out->motion;
     return ended[0] && ended[1];
 }

@@ -267,8 +267,37 @@ ARM_SELDOM static double arm_motion(const double *q, const double *near)
     return sum;
 }
 
+/* Whether a posture may keep its target a quarter of the way to another, each joint at a constant pace, those that turn by about
+   half a turn either way: `_reached_straight` in Python. */
+ARM_SELDOM static int arm_straight(const double *goal, const double *from, const double *way)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    static const int slides[ARM_JOINTS] = {@slides@};
+    double at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], r[ARM_JOINTS];
+    int j, flips;
+    for (flips = 0; flips < 1 << ARM_JOINTS; flips++) {
+        double miss = 0.0;
+        for (j = 0; j < ARM_JOINTS; j++) {
+            const int flip = (flips >> j) & 1;
+            if (flip && (slides[j] || 0.5 * ARM_TURN - fabs(way[j]) > @wide@))
+                break;
+            at[j * ARM_POINTS] = from[j * ARM_POINTS] + 0.25 * (way[j] - (flip ? copysign(ARM_TURN, way[j]) : 0.0)) * unit[j];
+        }
+        if (j < ARM_JOINTS)
+            continue;
+        arm_pose(at, T, 1);
+        arm_residual(T, goal, at, r);
+        for (j = 0; j < ARM_JOINTS; j++)
+            miss += r[j] * r[j];
+        if (!(sqrt(miss) > 100.0 * @turned@)) /* solutions are ten times `turned` away at most */
+            return 1;
+    }
+    return 0;
+}
+
 /* Whether a branch off a self-motion may be one with it, or a part of it, for `drop_contained` and `drop_twins` in Python. */
-ARM_SELDOM static int arm_doubted(const arm_branch *motion, const arm_branch *other, const double *way)
+ARM_SELDOM static int arm_doubted(const double *goal, const double *from, const double *way, const arm_branch *motion,
+    const arm_branch *other)
 {
     double held = 0.0;
     int j, moving = 0, differing = 0, alike = 1, more = 0;
@@ -281,11 +310,13 @@ ARM_SELDOM static int arm_doubted(const arm_branch *motion, const arm_branch *ot
         return other->weak && other->sigma < @high@ && moving <= ARM_JOINTS / 2 && held < @close_by@;
     if (motion->sigma < @solution@ && alike && more)
         return 1;
-    return (motion->partial || other->partial) && held < @drift@ && (held > @turned@ || differing <= @along@);
+    if (motion->partial && held < 3.0 * @turned@ && other->sigma < @solution@) /* `_on_motion` in Python goes round it */
+        return 1;
+    return motion->partial && other->partial && held < @turned@ && differing <= @along@ && arm_straight(goal, from, way);
 }
 
 /* Which branch is on the component of each of some: twin, -1 where there is none. 0 if that is left open. */
-ARM_SELDOM static int arm_twins(const arm_branch *one, const double *at, int count, int *twin)
+ARM_SELDOM static int arm_twins(const double *goal, const arm_branch *one, const double *at, int count, int *twin)
 {
     double way[ARM_JOINTS];
     int a, b, j;
@@ -300,7 +331,7 @@ ARM_SELDOM static int arm_twins(const arm_branch *one, const double *at, int cou
                 if (twin[a] >= 0)
                     return 0;
                 twin[a] = b;
-            } else if (one[a].motion && arm_doubted(one + a, one + b, way))
+            } else if (one[a].motion && arm_doubted(goal, at + a, way, one + a, one + b))
                 return 0;
         }
     for (a = 0; a < count; a++)
@@ -345,7 +376,7 @@ ARM_SELDOM static int arm_folds(const double *goal, const double *q, const doubl
             return -1;
         status = one[a].motion ? 2 : status > one[a].turns ? status : one[a].turns;
     }
-    if (!arm_twins(one, at, count, twin))
+    if (!arm_twins(goal, one, at, count, twin))
         return -1;
     for (a = 0; a < count; a++)
         if ((b = twin[a]) > a) { /* the first is listed, of a self-motion the one closer to `near` */
