@@ -108,7 +108,9 @@ def _fold_code(
     """How targets on an edge are told, and in front of it the Jacobian where C tells them."""
     if geometry is None or not _can_judge_folds(arm, task, geometry) or branches > LANES:
         return [], _part_text("no_folds")
-    text = _part_text("folds").replace("@followed@", _part_text("branch_to_fold") + "\n")
+    text = _part_text("folds")
+    for field, part in (("@followed@", "branch_to_fold"), ("@twins@", "twin_branches")):
+        text = text.replace(field, _part_text(part) + "\n")
     return [c_functions.jacobian_code(arm)], c_program.fill_fields(text, _fold_fields(arm, task) | fields)
 
 
