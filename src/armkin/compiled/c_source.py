@@ -13,8 +13,10 @@ from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.numeric.tolerances import (
     ACCEPTED,
     ARRIVED,
+    BENT,
     CLOSE_BY,
     CLOSED,
+    DRIFT,
     ERROR,
     FAR,
     FOLD_WAY,
@@ -155,9 +157,9 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     """What parts/folds.c is filled in with."""
     values = {
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
-        "close_by": CLOSE_BY, "smooth": SMOOTH, "wide": REACH, "way": FOLD_WAY,
+        "close_by": CLOSE_BY, "smooth": SMOOTH, "bent": BENT, "wide": REACH, "way": FOLD_WAY,
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "error": ERROR, "high": HIGH,
-        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED,
+        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED, "drift": DRIFT,
     }  # fmt: skip
     named = {name: number_text(value) for name, value in values.items()}
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it

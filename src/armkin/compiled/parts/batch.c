@@ -94,7 +94,7 @@ int64_t arm_batch(int64_t n, const double *target, const double *near, int64_t n
         arm_choose(close, q, inside, count);
         for (b = 0; b < ARM_BRANCHES; b++)
             for (i = 0; i < count; i++)
-                doubt[i] |= 2 * (!(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY));
+                doubt[i] |= !(miss[b * ARM_LANES + i] <= @accepted@) & !(miss[b * ARM_LANES + i] > ARM_NEARBY);
         for (i = 0; i < count; i++) {
             int close_by = 1;
             at_near[i] = 1;

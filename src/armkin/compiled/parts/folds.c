@@ -267,7 +267,43 @@ ARM_SELDOM static double arm_motion(const double *q, const double *near)
     return sum;
 }
 
-@twins@/* A target on an edge: its status, 0 if all of its branches are isolated, 1 if some meet, 2 if some are on self-motions, whose
+@twins@/* Whether a posture close to its target shows that this is out of reach there: `beyond_folds`, if not at once then after steps
+   along what is not lost. q: moved by these. */
+ARM_SELDOM static int arm_beyond(double *q, const double *goal)
+{
+    static const double unit[ARM_JOINTS] = {@unit@};
+    const int last = ARM_JOINTS - 1;
+    double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS], r[ARM_JOINTS], away[2][ARM_JOINTS];
+    double T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], f[2][ARM_JOINTS], along[ARM_JOINTS];
+    int j, k, step;
+    for (step = 0; step < @back@; step++) {
+        double bend, rest = 0.0;
+        arm_pose(q, T, 1);
+        arm_slope(q, slope, 1);
+        arm_residual(T, goal, q, r);
+        arm_singular_values(slope, A, V, S);
+        if (!(S[last - 1] > @high@ && S[last] < @lost@ && S[last] > 0.0))
+            return 0;
+        for (k = 0; k < ARM_JOINTS; k++) {
+            for (along[k] = 0.0, j = 0; j < ARM_JOINTS; j++)
+                along[k] += A[k][j] * r[j];
+            rest += k < last ? along[k] * along[k] : 0.0;
+            away[0][k] = @way@ * V[last][k], away[1][k] = -away[0][k];
+        }
+        arm_both_ways(q, goal, r, A, away, f);
+        bend = -(f[0][last] + f[1][last]) / (@way@ * @way@);
+        rest = sqrt(rest) / S[last - 1];
+        if (fabs(bend) > @bent@ && along[last] * bend > 0.0 && fabs(along[last]) > 10.0 * @solution@ && rest < @way@
+            && 100.0 * rest * rest < fabs(along[last]))
+            return 1;
+        for (j = 0; j < ARM_JOINTS; j++)
+            for (k = 0; k < last; k++)
+                q[j * ARM_POINTS] += V[k][j] * along[k] / S[k] * unit[j];
+    }
+    return 0;
+}
+
+/* A target on an edge: its status, 0 if all of its branches are isolated, 1 if some meet, 2 if some are on self-motions, whose
    joints are then free; -1 if that is left open. miss: infinite of what is one with a branch that is kept; inside: which
    branches are within limits. */
 ARM_SELDOM static int arm_folds(const double *goal, const double *q, const double *near, const int *inside, double *miss,
@@ -279,13 +315,14 @@ ARM_SELDOM static int arm_folds(const double *goal, const double *q, const doubl
     int which[ARM_BRANCHES], twin[ARM_BRANCHES], count = 0, status = 0, legal = 0, at_limit = 0, a, b, j;
     for (b = 0; b < ARM_BRANCHES; b++) {
         const double off = miss[b * ARM_LANES];
-        if (!(off <= @accepted@) && !(off >= @seed@ * @seed@)) /* a correction may make a branch of it */
-            return -1;
-        if (off <= @accepted@) {
-            for (j = 0; j < ARM_JOINTS; j++)
-                at[j * ARM_POINTS + count] = q[(b * ARM_JOINTS + j) * ARM_LANES];
+        if (!(off < @seed@ * @seed@))
+            continue;
+        for (j = 0; j < ARM_JOINTS; j++)
+            at[j * ARM_POINTS + count] = q[(b * ARM_JOINTS + j) * ARM_LANES];
+        if (off <= @accepted@)
             which[count++] = b;
-        }
+        else if (!arm_beyond(at + count, goal)) /* a correction may make a branch of it */
+            return -1;
     }
     if (!count)
         return -1;

@@ -1,6 +1,6 @@
 /* Whether a posture may keep its target a quarter of the way to another, each joint at a constant pace, those that turn by about
-   half a turn either way: `_reached_straight` in Python. */
-ARM_SELDOM static int arm_straight(const double *goal, const double *from, const double *way)
+   half a turn either way: `_reached_straight` in Python. slack: how much it may miss there. */
+ARM_SELDOM static int arm_straight(const double *goal, const double *from, const double *way, double slack)
 {
     static const double unit[ARM_JOINTS] = {@unit@};
     static const int slides[ARM_JOINTS] = {@slides@};
@@ -20,7 +20,7 @@ ARM_SELDOM static int arm_straight(const double *goal, const double *from, const
         arm_residual(T, goal, at, r);
         for (j = 0; j < ARM_JOINTS; j++)
             miss += r[j] * r[j];
-        if (!(sqrt(miss) > 100.0 * @turned@)) /* solutions are ten times `turned` away at most */
+        if (!(sqrt(miss) > slack))
             return 1;
     }
     return 0;
@@ -43,7 +43,11 @@ ARM_SELDOM static int arm_doubted(const double *goal, const double *from, const 
         return 1;
     if (motion->partial && held < 3.0 * @turned@ && other->sigma < @solution@) /* `_on_motion` in Python goes round it */
         return 1;
-    return motion->partial && other->partial && held < @turned@ && differing <= @along@ && arm_straight(goal, from, way);
+    if (!motion->partial || !other->partial || held > @drift@)
+        return 0;
+    if (held > @turned@) /* Python follows a circuit, which bends */
+        return arm_straight(goal, from, way, @drift@);
+    return differing <= @along@ && arm_straight(goal, from, way, 100.0 * @turned@);
 }
 
 /* Which branch is on the component of each of some: twin, -1 where there is none. 0 if that is left open. */
