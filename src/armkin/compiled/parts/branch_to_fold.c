@@ -90,6 +90,8 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             step = arm_to_curve(T + i, slope + i, goal, at + i, u, out->v, t, away[i], &away[i][ARM_JOINTS], regular + i);
             /* the next step is about as many times smaller than this as this one's square than the last one's */
             there[i] = step < @arrived@ || step * step * step < @error@ * before[i] * before[i];
+            if (!(step < (round ? 0.5 * before[i] : out->span))) /* it leads to no curve, or to another one */
+                return 0;
             open -= there[i], before[i] = step;
             for (j = 0; j < ARM_JOINTS; j++)
                 if (!(fabs(away[i][j]) < 3.0 * fabs(t)))

@@ -247,7 +247,8 @@ def _nodes(
     inverse, along_u = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
     bordered = np.zeros(inverse.shape)
     bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
-    on, going, before = np.zeros(M, bool), np.arange(M), np.zeros(M)
+    # what does not fall to half of the last step from one to the next leads to no curve, or to another one
+    on, going, before, most = np.zeros(M, bool), np.arange(M), np.zeros(M), span.copy()
     for _ in range(ITERATIONS):
         at, goal = x[:, going], np.concatenate([target[going]] * NODES)
         r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)
@@ -260,8 +261,8 @@ def _nodes(
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # the next step is about as many times smaller than this as this one's square than the last one's
         done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
-        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0) & (size < span[going])
-        on[going], before[going] = done & near, size
+        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0) & (size < most[going])
+        on[going], most[going], before[going] = done & near, 0.5 * size, size
         going = going[~done & near]
         if not len(going):
             break
