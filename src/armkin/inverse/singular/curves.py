@@ -18,7 +18,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-STEP = 0.2  # [rad, reaches] along a curve
+STEP = 0.3  # [rad, reaches] along a curve
 MOST = 250  # steps
 PASSED = 0.15  # of a step: joint values this close to its chord are on the way; a curve is half as far off it
 BEND = 4.0  # steps are at most so many times the second smallest singular value
