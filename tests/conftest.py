@@ -1,4 +1,4 @@
-"""Its being here puts this folder on the import path: helpers such as `command_line` are modules in it."""
+"""What all tests need; helpers such as `command_line` are modules of `helpers/`, which is on the import path."""
 
 from __future__ import annotations
 

@@ -6,13 +6,13 @@ import re
 from pathlib import Path
 
 import pytest
+from test_architecture import MAY_IMPORT
 
 import armkin
 from armkin.errors import UsageError
 from armkin.inverse.solvers import recognise
 from armkin.robot_file import catalogue
 from slow import SLOW
-from test_architecture import MAY_IMPORT
 
 ROOT = Path(__file__).parents[1]
 HOUSE, SOLVER = ROOT / "docs" / "architecture.md", ROOT / "docs" / "solver.md"

@@ -112,7 +112,7 @@ def test_makers_reaches() -> None:
     "name", sorted(set(CHAINS) & {path.stem for path in ROBOTS.glob("*.yaml")} - {"panda", "irb120", "roarm_m2"})
 )
 def test_a_shipped_arm_is_its_source_s_urdf(name: str) -> None:
-    """The robot file against the URDF's chain as numbers, walked by tests/urdf_chains.py: to 0.01 mm."""
+    """The robot file against the URDF's chain as numbers, walked by tests/helpers/urdf_chains.py: to 0.01 mm."""
     chain, arm = CHAINS[name], load(name)
     joints = [joint["name"] for joint in moving_joints(chain) if joint["type"] != "fixed"]
     for q in np.random.default_rng(3).uniform(-3, 3, (20, arm.n)):

@@ -16,7 +16,7 @@ import numpy as np
 
 import armkin
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
+sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
 from redundant_arms import covers_value, held_answers, redundant_postures  # noqa: E402
 
 from armkin.inverse.solvers.redundant import redundancy  # noqa: E402

@@ -24,7 +24,7 @@ from resource import RUSAGE_CHILDREN, getrusage
 from typing import NamedTuple
 
 ROOT = Path(__file__).parents[2]
-sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
+sys.path += [str(ROOT / "tests/helpers"), str(ROOT / "tests/teach")]
 
 from browser_page import chromium  # noqa: E402
 from playwright.sync_api import Browser, Page  # noqa: E402

@@ -18,7 +18,7 @@ import numpy as np
 import armkin
 from armkin.forward import tip_and_jacobian
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
+sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
 from test_position_first import ARMS, random_targets  # noqa: E402
 
 GRID = {1: 200, 2: 28}  # values of each joint but the first three, by how many these are

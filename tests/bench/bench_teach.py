@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
-sys.path += [str(ROOT / "tests"), str(ROOT / "tests/teach")]
+sys.path += [str(ROOT / "tests/helpers"), str(ROOT / "tests/teach")]
 
 from browser_page import chromium  # noqa: E402
 from playwright.sync_api import Browser, ViewportSize  # noqa: E402

@@ -15,7 +15,7 @@ from bench_batches import c_alone, least_cpu
 
 import armkin
 
-sys.path += [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1])]
+sys.path += [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
 
 from test_tool_down import arm_and_screws  # of the inverse tests
 

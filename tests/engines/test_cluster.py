@@ -31,7 +31,7 @@ from killing_chunks import square_or_die
 def cluster_processes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[cluster_kills.Cluster]:
     """A scheduler with two worker processes, whose nanny starts another for one that is killed."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.fspath(ROOT / "tests"))  # where the work is
+        patch.setenv("PYTHONPATH", os.fspath(ROOT / "tests/helpers"))  # where the work is
         cluster = cluster_kills.Cluster(tmp_path_factory.mktemp("cluster"), 2)
         yield cluster
         cluster.close()
@@ -65,7 +65,7 @@ def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
     """Of the pool; a chunk that is in hand is not waited for."""
     script = tmp_path / "pool.py"
     script.write_text(_POOL)
-    finds = {**os.environ, "PYTHONPATH": os.fspath(ROOT / "tests")}
+    finds = {**os.environ, "PYTHONPATH": os.fspath(ROOT / "tests/helpers")}
     with subprocess.Popen([sys.executable, script], env=finds, text=True, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         answered = {int(process.stdout.readline()) for _ in range(2)}

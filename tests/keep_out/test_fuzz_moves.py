@@ -19,7 +19,7 @@ from unittest import mock
 import numpy as np
 import yaml
 
-sys.path.append(str(Path(__file__).parents[1]))
+sys.path.append(str(Path(__file__).parents[1] / "helpers"))
 
 import armkin
 from armkin import board_catalogue

@@ -28,7 +28,7 @@ def import_chain(chain: dict[str, Any], **settings: Any) -> armkin.Arm:
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_a_real_chain_has_the_poses_of_its_urdf(name: str) -> None:
-    """To 1e-9 mm: against poses computed by pinocchio or yourdfpy (`expected`), and by tests/urdf_chains.py."""
+    """To 1e-9 mm: against poses computed by pinocchio or yourdfpy (`expected`), and by tests/helpers/urdf_chains.py."""
     chain = CHAINS[name]
     assert chain["expected"]
     arm = import_chain(chain)

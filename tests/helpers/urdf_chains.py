@@ -16,7 +16,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import NDArray
 
-CHAINS: dict[str, dict[str, Any]] = json.loads((Path(__file__).parent / "robot_file/urdf_chains.json").read_text())
+CHAINS: dict[str, dict[str, Any]] = json.loads((Path(__file__).parents[1] / "robot_file/urdf_chains.json").read_text())
 
 
 def urdf_text(chain: Mapping[str, Any]) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from xdist.scheduler import LoadScopeScheduling
 
-_ROOT = Path(__file__).parents[1]
+_ROOT = Path(__file__).parents[2]
 _BROWSER = re.compile(r"^(?:from|import) browser_page\b", re.MULTILINE)
 # helpers that compile the firmware, or an exported arm; a cluster; an installed kind; syntax trees of the whole package
 _HELPERS = "emulator|measure|bare_host|exported_c|cluster_kills|emulated_kinds|ast"

@@ -12,7 +12,7 @@ from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 from typing import Any, NamedTuple
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 THREE_DOF = "robots/three_dof.yaml"
 POSE = (-30, 5, -5)  # its published pose [deg] (tests/test_published.py)
 COUNTS = [-1067, -10144, 5667]  # of its motors there, from home
