@@ -38,7 +38,7 @@ from armkin.model.lock_joints import unlock
 MOST_SWEEPS = 10_000  # combinations of swept values that are tried
 _RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first
 _THIN = 20  # branches of one target that are kept before those that no answer shows are dropped
-_MOST_ANSWERS = 16_384  # of one target and one swept value, 6.5 kB each, that are kept at once
+_MOST_ANSWERS = 16_384  # answers, of 6.5 kB each, of one target and one swept value that are kept at once
 
 
 @dataclass(frozen=True)

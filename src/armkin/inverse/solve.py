@@ -39,7 +39,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
 from armkin.model.arm import Arm, actual_arm
 
-WORTH = 256  # poses of an elimination that are worth a thread, and of which its own chunks are
+WORTH = 256  # poses of an elimination that are worth a thread; a thread's own chunks have as many
 
 
 def ik(

@@ -30,11 +30,11 @@ from armkin.reachability.reach_cells import Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SOLVES = 40_000  # of a chunk: about a second with all measures and a closed form
-SLOWER = 40  # times, by elimination
-FAMILIES = 1_000  # times, where the answers of a pose are curves
-BLOCK = 2_048  # solves at once: their words stay in the cache
-KEEP = 5_000_000  # cells that a result with a file still holds as arrays
+SOLVES = 40_000  # A chunk holds so many solves: about a second with all measures and a closed form.
+SLOWER = 40  # A solve by elimination counts as so many by a closed form.
+FAMILIES = 1_000  # A solve counts as so many where the answers of a pose are curves.
+BLOCK = 2_048  # So many solves are made at once: their words stay in the cache.
+KEEP = 5_000_000  # A result with a file still holds so many cells as arrays.
 UNITS = {
     "x_mm": "mm", "y_mm": "mm", "z_mm": "mm", "share": "1", "share_any": "1", "branches": "1", "single": "1",
     "manipulability": "mm^k", "limit_margin": "1", "step_error_mm": "mm",

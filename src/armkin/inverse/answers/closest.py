@@ -20,10 +20,10 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 POOL = 4000  # postures within limits of which each target starts from the nearest
-STARTS = 14  # of them
-STEPS = 10  # of `closest_from_every_start`
+STARTS = 14  # postures from which the distance to one target is minimised
+STEPS = 10  # iterations, at most, of `closest_from_every_start`
 Rounds = tuple[tuple[int, int], ...]  # steps, and how many starts go on after them
-ROUNDS: Rounds = (3, 6), (7, 3)
+ROUNDS: Rounds = (3, 6), (7, 3)  # iterations of each round of one target, and the postures that it works on
 AT_ONCE = 256  # targets worked on together
 
 

@@ -23,11 +23,11 @@ from armkin.model.arm import Arm
 # base's axes, which has four, in one of 13. There the last digit that the entries have tells: an angle is off by less
 # than three halves of it, a position of as many digits, beside the reach, by some eleven. A rotation of whole numbers,
 # by right angles about the base's axes, shows nothing: only the position's last digit tells there.
-DEFECTS = 4.0
-HALVES = 12.0
-COARSEST = 5  # digits: a matrix of fewer is no rotation to that many
-PRINTED = 6  # digits at least that a position is printed with; zeros at its end show fewer
-BLOCK = 2_048  # rows of which all arrays fit the cache
+DEFECTS = 4.0  # bound of a rounded target's error, in defects of its rotation
+HALVES = 12.0  # bound of a rounded target's error, in halves of the last digit of its rotation
+COARSEST = 5  # digits, at least, of a matrix's entries: one of fewer is no rotation to that many
+PRINTED = 6  # digits, at least, that a position is printed with; zeros at its end show fewer
+BLOCK = 2_048  # rows worked on at once: all their arrays fit the cache
 FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
 
 

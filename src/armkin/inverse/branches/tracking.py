@@ -16,8 +16,8 @@ from armkin.model.arm import Arm
 
 CHUNK = 2048  # targets linked at once
 
-CLOSE = 0.2  # [rad or reaches] a branch may move this far from one target to the next
-CLEAR = 1.5  # and its second best partner must be this many times as far away
+CLOSE = 0.2  # distance [rad or reaches] that a branch may move from one target to the next
+CLEAR = 1.5  # ratio, at least, of the distances to the second best partner and to the best one
 
 
 def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:

@@ -16,8 +16,8 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 
-TURN = 2 * np.pi
-HALF = np.pi + SLACK  # how far above `near` a copy may be
+TURN = 2 * np.pi  # whole turn [rad]
+HALF = np.pi + SLACK  # distance [rad] above `near`, at most, of a copy
 MOST = 50_000  # copies of one branch that `turns` gives
 
 

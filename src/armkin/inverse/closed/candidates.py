@@ -21,13 +21,13 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, shifted_targets
 from armkin.model.arm import Arm
 
-FEW = 8  # targets that plain Python does sooner than arrays
-FREED = 24  # values tried for joints that a target leaves free
-CLOSER = 7  # times that the best of these is sought sixteen times closer: to 1e-9 rad
+FEW = 8  # targets up to which plain Python is faster than arrays
+FREED = 24  # values tried for a joint that a target leaves free
+CLOSER = 7  # refinements of the best of these values, each sixteen times closer: to 1e-9 rad
 # Steps from `near` [rad] all round, none of them to a round value: there a wrist may be straight, whose joints are free
 # as well and would jump to what is preferred.
 ROUND = np.asarray((np.arange(FREED)[:, None] + 0.37) * (2.0 * np.pi / FREED) - np.pi, np.float64)
-SHAKEN = 8  # moves of a target to where nothing is free
+SHAKEN = 8  # moves tried of a target to where nothing is free
 
 
 class Recorded:

@@ -16,11 +16,11 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near there
-MOST = 12  # places looked at for each target
-AWAY = 0.4  # [rad, reaches] how far from there the other self-motion is looked for
-ONE = 0.13  # [rad, reaches] places closer than this are one: half a step of a joint that turns
-STEP = 1.0  # [rad, reaches] joints that move farther from one step to the next are not on one curve
+MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near
+MOST = 12  # places looked at, at most, for each target
+AWAY = 0.4  # distance [rad, reaches] from a crossing at which the other self-motion is looked for
+ONE = 0.13  # distance [rad, reaches] of places that are one: half a step of a joint that turns
+STEP = 1.0  # movement [rad, reaches] of joints from one step to the next, above which they are not on one curve
 
 
 def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:

@@ -22,9 +22,9 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import joint_motion, rotation_about
 from armkin.model.units import radian_or_reach
 
-MOST = 5  # steps
+MOST = 5  # Newton steps, at most, from a candidate
 SLOPE = 48.0  # error of the first step per distance from the class, where the arm is not near a singularity
-SENSES = {-1.0, 0.0, 1.0}  # of a joint in a sum
+SENSES = {-1.0, 0.0, 1.0}  # factors of a joint in a sum: turned back, left out, turned forth
 ABSENT = 90.0  # squared residual of a root that is not real, in distances from the class: 9 on each side of it
 
 

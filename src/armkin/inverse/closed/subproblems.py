@@ -39,9 +39,9 @@ class Precision(NamedTuple):
     nearby: float  # squared residual up to which a branch may be one
 
 
-ULPS = 128 * 2.0**-23  # of a float: a pose of six joints is off by ten to a hundred
+ULPS = 128 * 2.0**-23  # relative rounding of a float: a pose of six joints is off by ten to a hundred units
 DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
-SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)
+SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)  # thresholds in single precision
 
 _current = ContextVar("precision", default=DOUBLE)
 

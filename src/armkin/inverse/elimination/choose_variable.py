@@ -24,7 +24,7 @@ from armkin.inverse.elimination.polish import jacobian, refine, tip
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse
 
-PSI = (0.7321, -1.1879)  # offsets of the hidden joint; arbitrary, but never where people put their arms
+PSI = (0.7321, -1.1879)  # offsets [rad] of the hidden joint; arbitrary, but never where people put their arms
 SAMPLES = 11  # random poses on which roles are compared
 MANY = 0.3  # share of poses left open from which on other roles are tried
 STEEP = 30.0  # norm of the inverse Jacobian above which a posture says little of a role

@@ -22,7 +22,7 @@ from armkin.model.rotation import inverse, joint_motion
 # The columns of Q as (b, a).  The five that give the joints back come last: with Q = (orthonormal)(triangle)
 # they follow from the last five rows of the triangle alone.
 _MONOMIALS = [(1, 1), (1, 2), (2, 1), (2, 2), (0, 0), (1, 0), (2, 0), (0, 1), (0, 2)]
-_READ = 4  # from here on
+_READ = 4  # number of the first of the five columns from which the joints are read
 
 # A few arbitrary poses, from turns about z, x and z: they show ranks that all poses share.
 _SAMPLES: Array = np.stack(

@@ -15,8 +15,8 @@ from armkin.inverse.numeric import tolerances as tol
 
 # (cos 3f, sin 3f, cos f, sin f) to (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f
 _CUBIC: Array = 0.25 * np.array([[1, 0, 3, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, -1, 0, 3]], dtype=float)
-_TURN = 0.4137  # [rad] by which f is turned: no joint stands where tan f is infinite then
-_SECOND = 0.6180  # share of the second joint: solutions that have the first one alike are told apart by it
+_TURN = 0.4137  # angle [rad] by which f is turned: no joint stands where tan f is infinite then
+_SECOND = 0.6180  # weight of the second joint: solutions that have the first one alike are told apart by it
 
 
 def groups(pose: Int, x: Array) -> list[Int]:

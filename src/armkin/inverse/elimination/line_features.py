@@ -23,7 +23,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.model.rotation import joint_motion
 
-SIZE = 15
+SIZE = 15  # features of a line
 _P, _L, _PP, _PL, _M, _W, _ONE = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11), slice(11, 14), 14
 
 Z_AXIS: Array = np.zeros(SIZE)

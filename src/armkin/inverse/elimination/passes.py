@@ -16,7 +16,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse
 
 TILT = (0.02, 0.3)  # imaginary part [rad] of a root that is still tried: main pass, later passes
-REGULAR = 1e3  # norm of inverse Jacobians up to which roots are that exact
+REGULAR = 1e3  # norm of inverse Jacobians up to which roots are as exact as those of a regular posture
 
 
 def run_pass(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answers, Bool, Bool, Answers]:

@@ -12,8 +12,8 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 
-LARGEST_STEP = 0.5  # rad or scaled length: a longer Newton step leaves the region it was made for
-MORE = 3  # steps more for candidates this close that have not converged
+LARGEST_STEP = 0.5  # Newton step [rad, scaled length], at most: a longer one leaves the region it was made for
+MORE = 3  # further Newton steps for candidates that are close but have not converged
 
 
 class Polished(NamedTuple):

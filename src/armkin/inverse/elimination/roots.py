@@ -17,9 +17,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 from armkin.model.rotation import inverse
 
-STEADY = 1e5  # entries up to which a pencil's simple roots and their vectors are known far better than that
-ONE = 1e3  # sine of the angle between their vectors over that distance, up to which they have one vector
-_ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # a right-hand side that no arm is made for
+STEADY = 1e5  # size of a pencil's entries up to which its simple roots and their vectors are known well
+ONE = 1e3  # quotient of the sine between two roots' vectors and their distance, up to which they have one vector
+_ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # right-hand side that no arm is made for
 
 
 class Seeds(NamedTuple):

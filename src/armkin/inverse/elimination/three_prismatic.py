@@ -23,8 +23,8 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import joint_motion, rotation_about
 
-FREE = 0.7321  # [rad] its value there
-OTHERS = (0.0, 1.3, 2.9)  # [rad] values of it at which the slides' directions are compared, beside that one
+FREE = 0.7321  # value [rad] at which a free joint is held
+OTHERS = (0.0, 1.3, 2.9)  # values [rad], beside FREE, at which the slides' directions are compared
 
 
 def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:

@@ -15,9 +15,9 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-STARTS = 64  # of a search
-STEPS, PATIENCE = 25, 8  # of each
-ROUND = np.pi / 4  # [rad] roots of high order nearly always stand where axes are parallel or at such angles
+STARTS = 64  # random starts of a search
+STEPS, PATIENCE = 25, 8  # Newton steps of a start at most; steps without gain after which it ends
+ROUND = np.pi / 4  # angle [rad] whose multiples roots of high order nearly always have: parallel axes, or such angles
 
 
 def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:

@@ -24,10 +24,10 @@ from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holdi
 from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
 
-TURN = 2 * np.pi
+TURN = 2 * np.pi  # whole turn [rad]
 EVEN = 24  # samples of a turn besides the roots
-STEPS = 8  # of the golden section: the kinks of the motion from near are samples, and a parabola ends it
-JOINTS = (0, 1, 2), (4, 5, 6)  # of the shoulder and of the wrist
+STEPS = 8  # steps of the golden section: the kinks of the motion from near are samples, and a parabola ends it
+JOINTS = (0, 1, 2), (4, 5, 6)  # numbers of the joints of the shoulder and of the wrist
 
 
 def _offsets(A: Array, B: Array) -> Array | None:

@@ -24,8 +24,8 @@ from armkin.model.arm import Arm
 from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about, shrink_translations
 
-DEGREE = 8
-Z = np.array([0.0, 0.0, 1.0])
+DEGREE = 8  # degree of the polynomial whose roots are the boundaries
+Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 Complex = NDArray[np.complex128]
 
 

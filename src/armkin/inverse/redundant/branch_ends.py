@@ -13,10 +13,10 @@ from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.samples import Changes, Gone, Summary, Turns, nearest_other, value_at
 
-HALVINGS = 60  # steps to where a branch ends, at most
-SECANTS = 24  # of which the later ones halve
-BACK = 0.1  # of what is left, from past an end to where the branch is there
-MERGING = 0.01  # [rad^2] branches that merge are less than so far apart
+HALVINGS = 60  # steps, at most, to where a branch ends
+SECANTS = 24  # secant steps to a branch's end, of which the later ones halve
+BACK = 0.1  # share of what is left, from past an end, by which a step goes back to where the branch is
+MERGING = 0.01  # squared distance [rad^2] below which branches may merge
 PEAK = 12  # steps to where a branch is nearest to its limits, or farthest beyond them
 
 

@@ -18,9 +18,9 @@ from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
-FARTHEST = 0.3  # [rad, reaches] step of Newton's method,
-NEWTON = 4  # and how many
-AT_ONCE = 1000  # postures that it works on: they stay in the cache
+FARTHEST = 0.3  # length [rad, reaches], at most, of one step of Newton's method
+NEWTON = 4  # steps of Newton's method onto the curve
+AT_ONCE = 1000  # postures that Newton's method works on at once: they stay in the cache
 
 
 class Points(NamedTuple):

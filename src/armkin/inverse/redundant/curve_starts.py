@@ -25,11 +25,11 @@ from armkin.inverse.redundant.interval_pieces import may_turn_back
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.solvers.redundant import Redundancy, arm_without, nearly_closed
 
-PLANES = 60  # values of the joint that are answered
-BETWEEN = 12  # parts of the way between two, where answers may be that neither has
-VALUES = 0.05, 0.05 + np.pi / 2  # [rad] at which that other joint is held, beside where the others would be special
-SECANTS = 4  # steps along a cubic to where it has such a value
-ON_CURVE = 0.02  # [rad, reaches] an answer this close to a curve is on it
+PLANES = 60  # values of the joint at which the target is solved
+BETWEEN = 12  # parts of the way between two planes, where answers may be that neither plane has
+VALUES = 0.05, 0.05 + np.pi / 2  # angles [rad] at which the other joint is held: the remaining ones are not special
+SECANTS = 4  # steps along a cubic to where the other joint has such a value
+ON_CURVE = 0.02  # distance [rad, reaches] of an answer from a curve up to which it is on it
 
 
 class Nodes(NamedTuple):

@@ -16,11 +16,11 @@ from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.redundant.samples import Changes, Runs, Summary, place_between, summary_of_samples, value_at
 from armkin.inverse.tasks.task import distance
 
-EVEN = 180  # samples of a turn of the redundant joint besides all places where something may change;
-SAMPLES = 360  # where these are not known,
-CLOSER = 4  # times as many values where branches may be there between them,
-FINER = 48  # and where none had an answer
-STEPS = 16  # of the golden section
+EVEN = 180  # even samples of a turn of the redundant joint, besides all places where something may change
+SAMPLES = 360  # samples of a turn where these places are not known
+CLOSER = 4  # factor on the number of values where branches may be between two samples
+FINER = 48  # factor on the number of values where no sample had an answer
+STEPS = 16  # steps of the golden section
 
 
 class Followed(NamedTuple):

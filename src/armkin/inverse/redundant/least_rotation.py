@@ -17,7 +17,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-STEPS = 80  # of one start
+STEPS = 80  # iterations, at most, of one start
 
 
 class Box(NamedTuple):

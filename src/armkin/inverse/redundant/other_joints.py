@@ -28,15 +28,15 @@ from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
 from armkin.model.arm import Arm
 
 Ik = Callable[..., Solutions]
-AT_A_TIME = 2_000  # targets of a formula: they stay in the cache
-SAFE = 4.0  # times the bend that the samples show
-NEAR = 0.3  # [rad] of a limit is what can come to it before the next sample
-FAST = 0.2  # [rad] from a sample to the next: beside a straight shoulder or wrist
-BESIDE = 0.2  # [rad] beyond its limits a branch may be legal between two samples,
-ASIDE = 0.3  # and near its end
-PARTS = 8  # of the way between two samples
-MOST = 16  # such ways of a target
-CLOSER = MOST * (PARTS - 1)  # values of each
+AT_A_TIME = 2_000  # targets that a formula solves at once: they stay in the cache
+SAFE = 4.0  # safety factor on the bend that the samples show
+NEAR = 0.3  # distance [rad] of a limit within which a branch can come to it before the next sample
+FAST = 0.2  # movement [rad] from one sample to the next that is fast: beside a straight shoulder or wrist
+BESIDE = 0.2  # distance [rad] beyond its limits at which a branch may still be legal between two samples
+ASIDE = 0.3  # distance [rad] beyond its limits, as BESIDE, near a branch's end
+PARTS = 8  # parts of the way between two samples
+MOST = 16  # ways between two samples, at most, that are refined for a target
+CLOSER = MOST * (PARTS - 1)  # values solved, at most, on the refined ways of a target
 
 
 class Sampled(NamedTuple):

@@ -32,10 +32,10 @@ from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 from armkin.model.limits import outside_limits
 
-POOL = 32_768  # postures within limits
-ON_LIMIT = 0.25  # share of their joints that are on a limit
-NEAREST = 1024  # of them, those nearest to a target's position
-STARTS = 256  # of these, those farthest from each other
+POOL = 32_768  # postures within limits that starts are chosen from
+ON_LIMIT = 0.25  # share of the pool's joints that are on a limit
+NEAREST = 1024  # postures of the pool that are nearest to a target's position
+STARTS = 256  # starts of a target: those of the nearest postures that are farthest from each other
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
 Ik = Callable[..., Solutions]

@@ -16,7 +16,7 @@ from armkin.inverse.redundant.boundaries import on_both_sides
 from armkin.inverse.redundant.interval_pieces import best_samples, holding_none, may_turn_back, runs
 from armkin.inverse.redundant.other_joints import Follower, Sampled
 
-AT_A_TIME = 8_000  # samples: they stay in the cache
+AT_A_TIME = 8_000  # samples worked on at once: they stay in the cache
 
 
 class Changes(NamedTuple):

@@ -20,12 +20,12 @@ from armkin.inverse.redundant.curve_starts import Nodes, answers_off_curves, ans
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
-HALVINGS = 6  # of the way between two answers
-APART = 6.0  # [rad, reaches] answers may be that one cubic joins
-LONGEST = 0.3  # [rad, reaches] step along a curve
-ASIDE = 0.3  # of a step, that Newton's method moves a point sideways at most
-TRIES = 100  # steps of an arc
-ROUNDS = 20  # of arcs, each to the next plane
+HALVINGS = 6  # halvings of the way between two answers
+APART = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
+LONGEST = 0.3  # longest step [rad, reaches] along a curve
+ASIDE = 0.3  # distance, as a share of a step, that Newton's method moves a point sideways at most
+TRIES = 100  # steps, at most, of one arc
+ROUNDS = 20  # arcs, at most, of one curve, each to the next plane
 
 
 class _Curves:

@@ -21,12 +21,12 @@ from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
 AT_ONCE = 64  # targets whose points are worked on together
-PARTS = 4  # of the way between two points, at whose ends limits and the joint's sense are asked
+PARTS = 4  # parts of the way between two points, at whose ends limits and the joint's sense are asked
 SECANTS = 10  # steps along a cubic to where a limit is crossed or the joint turns back
-WAY = 0.1  # of the way, on both sides, at which a cubic's slope tells how the joint turns back: it is a parabola
-TURNS = 3  # steps along the curve to there
-LAST = 2  # steps that take away what is left of a posture
-STEPS = 12  # of the golden section
+WAY = 0.1  # share of the way, to both sides, at which a cubic's slope tells how the joint turns back, as a parabola
+TURNS = 3  # steps along the curve to where the joint turns back
+LAST = 2  # last steps, which take away what is left of a posture's residual
+STEPS = 12  # steps of the golden section
 
 
 def trace_families(follower: Follower) -> Iterator[Traced]:

@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import tolerances as tol
 
-TERMS = 12  # of a Taylor series
-WIDE = 0.35  # half a cell times the degree: what is left out is 1e-14 of the polynomial's size
-HALVINGS = 28
-MORE = 4  # coefficients above the degree that samples tell, too
-ASIDE = 0.15  # of the real values are the samples
-SAFE = 4.0  # times what these show
-STEPS = 8  # of Newton's method in a cell in which a polynomial is monotone
+TERMS = 12  # terms of a Taylor series
+WIDE = 0.35  # half a cell's width times the degree: what is left out is 1e-14 of the polynomial's size
+HALVINGS = 28  # halvings of a cell, at most
+MORE = 4  # coefficients above the degree that the samples tell, too
+ASIDE = 0.15  # distance [rad] of the samples from the real values
+SAFE = 4.0  # safety factor on the rounding that the samples show
+STEPS = 8  # steps of Newton's method in a cell in which a polynomial is monotone
 
 
 class Roots(NamedTuple):

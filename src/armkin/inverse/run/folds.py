@@ -22,9 +22,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.model.units import radian_or_reach
 
-SURELY = 1.02  # times SOLUTION or its inverse: what lies between is looked at closely
-SYMMETRIC = 0.2  # most that the slopes at a pair's ends differ by, in parts of their size
-APART = 10.0 * tol.SAME  # [rad, reaches] two branches closer than this are looked at closely
+SURELY = 1.02  # factor on SOLUTION or its inverse: what lies between the two bounds is looked at closely
+SYMMETRIC = 0.2  # difference, relative to their size, of the slopes at a pair's ends at most
+APART = 10.0 * tol.SAME  # distance [rad, reaches] of two branches below which they are looked at closely
 
 
 class Doubted(NamedTuple):

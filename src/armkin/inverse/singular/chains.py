@@ -15,7 +15,7 @@ from armkin.inverse.singular.local_structure import Structure, leave_spans, memb
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
-FEW_LINKS = 4  # curves on each side of a posture whose component leaves a shortened span: others are told elsewhere
+FEW_LINKS = 4  # curves on each side of a posture whose component leaves a shortened span: others are decided elsewhere
 LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
 
 

@@ -23,9 +23,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import chains, curves, high_order_roots, meetings, self_motions
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
-AT_ONCE = 128  # candidates of which it is cheaper to ask all together than one after the other
+AT_ONCE = 128  # candidates from which on asking all together is cheaper than one after the other
 FEW = 24  # candidates of a target that are compared all with all
-PATIENCE = 6  # steps that bring hardly anything after which a candidate is left where it is
+PATIENCE = 6  # steps with hardly any gain after which a candidate is left where it is
 
 # For targets (R, ...), preferred values (R, n) and whether branches seem lost (R,): more postures (R, M, n), their
 # branches (M,), and of which targets (R,) these may not lead to all.

@@ -18,12 +18,12 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-STEP = 0.3  # [rad, reaches] along a curve
-MOST = 250  # steps
-PASSED = 0.15  # of a step: joint values this close to its chord are on the way; a curve is half as far off it
-BEND = 4.0  # steps are at most so many times the second smallest singular value
-OVER = 0.05  # a step over a crossing
-STRAIGHT = 0.8  # cosine between the directions of two steps
+STEP = 0.3  # step [rad, reaches] along a curve
+MOST = 250  # steps, at most, along a curve
+PASSED = 0.15  # share of a step: joint values this close to its chord are on the way; a curve is half as far off it
+BEND = 4.0  # length of a step, at most, in second smallest singular values
+OVER = 0.05  # step [rad, reaches] over a crossing
+STRAIGHT = 0.8  # cosine, at least, between the directions of two steps
 
 
 class Step(NamedTuple):

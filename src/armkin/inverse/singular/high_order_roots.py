@@ -16,8 +16,8 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-BESIDE = 0.1  # of the distance between two: as far as a posture beside the one half way may be from it
-ROOT = 0.03  # of that distance: an exact root's next Newton step is shorter, that of a point off one of order 16 longer
+BESIDE = 0.1  # share of the distance of two roots, up to which a posture may stand from the one halfway
+ROOT = 0.03  # share of that distance: the next Newton step of an exact root is shorter, beside one of order 16 longer
 
 
 def solves_between(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array, target: Array) -> Bool:

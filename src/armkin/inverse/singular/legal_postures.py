@@ -23,7 +23,7 @@ from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-FINE = np.deg2rad(0.1)  # between the postures of a self-motion that are looked at
+FINE = np.deg2rad(0.1)  # step [rad] between the postures of a self-motion that are looked at
 
 
 def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:

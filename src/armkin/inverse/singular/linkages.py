@@ -19,7 +19,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm
 
-PLACES = np.arange(1.0, 5.0)[:, None]  # [rad] along a line; zero is the fifth
+PLACES = np.arange(1.0, 5.0)[:, None]  # places [rad] along a line; zero is the fifth
 
 
 class Linkages(NamedTuple):

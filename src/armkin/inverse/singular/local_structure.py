@@ -21,21 +21,21 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 NODES = 10  # values of t at which g and x are computed: polynomials of degree 9 are exact to rounding on `span`
-NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev's, of spans
+NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev nodes of a span
 ITERATIONS = 8  # Newton steps onto the curve
-SHRINK = 8  # a curve that turns away within a span is asked for a span so many times shorter,
-SHRINKS = 3  # as often as this
-LONGER = 0.25, 2.0  # times as long as the last a span is, at least and at most
-STEPS = 200  # equal ones of a span: what rises above `SOLUTION` within one does so by less than a thousandth
+SHRINK = 8  # factor by which a span is shortened where a curve turns away within it
+SHRINKS = 3  # times that a span is shortened at most
+LONGER = 0.25, 2.0  # length of a span, at least and at most, relative to the last one
+STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(tol.FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
-SIGNS = np.array([1.0, -1.0])[:, None, None]  # both ways
-BACK = 5  # steps at most back onto the curve
-SERIES = 0.01  # [rad, reaches] as far as a series of second order is compared with g
+SIGNS = np.array([1.0, -1.0])[:, None, None]  # senses of a curve: both ways
+BACK = 5  # steps, at most, back onto the curve
+SERIES = 0.01  # distance [rad, reaches] up to which a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
-FINE = np.linspace(0.0, 1.0, 33)[:, None]  # of a component: where its slope is compared
-FINER = np.linspace(0.0, 1.0, 129)[:, None]  # of an interval in which it ends, and of the one between two of these
+FINE = np.linspace(0.0, 1.0, 33)[:, None]  # parameters of a component at which its slope is compared
+FINER = np.linspace(0.0, 1.0, 129)[:, None]  # parameters of an interval where a component ends, or between two
 
 
 class Structure(NamedTuple):
@@ -293,7 +293,7 @@ _FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
 _POWERS = np.array([
     np.pad(np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0]), (0, NODES))[:NODES] for k in range(NODES)
 ]).T  # fmt: skip
-TO_POWERS, TO_LAST = _POWERS @ _FIT, _FIT[-2:]  # from values at the nodes at once: for machine code
+TO_POWERS, TO_LAST = _POWERS @ _FIT, _FIT[-2:]  # from values at the nodes: coefficients, and the last two
 
 
 def _values(coefficients: Array, s: Array) -> Array:

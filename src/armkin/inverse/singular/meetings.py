@@ -22,13 +22,13 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-BOW = 0.1  # of its length: a curve is no farther off its chord
-AROUND = 256  # directions in a plane, of which each stands for its opposite, too
-ACROSS = 64  # along the edges of a cube whose sides hold directions in space
-SAMPLE = 61  # one of so many of these is asked first: most curves have one below what all must exceed
-ALL_ROUND = 5.0 * tol.BENT  # [1/rad] curvature in all directions: a residual has passed `SOLUTION` 1e-3 rad away
+BOW = 0.1  # distance of a curve from its chord, at most, relative to the chord's length
+AROUND = 256  # directions in a plane, each of which stands for its opposite, too
+ACROSS = 64  # points along each edge of a cube whose sides hold directions in space
+SAMPLE = 61  # stride of the directions asked first: most curves have one below what all must exceed
+ALL_ROUND = 5.0 * tol.BENT  # curvature [1/rad] in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
-SPREAD = 5.0  # times that in some direction: no surface of solutions, and the zeros are clear
+SPREAD = 5.0  # factor on that curvature in some direction: no surface of solutions, and the zeros are clear
 
 
 def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:

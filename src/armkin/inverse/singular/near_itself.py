@@ -23,9 +23,9 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
-ROOM = 2.0 * tol.SOLUTION  # [reaches] from the tool to a target that `near` might solve: twice, for rounding
-COARSE = 1e4 * ROOM  # and to a pose that is rounded where its rotation does not show it, to six digits
-ROUNDED = 1.001 * tol.SOLUTION  # residual that solves a rounded target, if it is more
+ROOM = 2.0 * tol.SOLUTION  # distance [reaches] of the tool from a target that `near` might solve: twice, for rounding
+COARSE = 1e4 * ROOM  # distance [reaches], as ROOM, from a pose rounded to six digits where its rotation does not tell
+ROUNDED = 1.001 * tol.SOLUTION  # residual, at least, that solves a rounded target
 
 
 def at_tip(

@@ -21,8 +21,8 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
-STEP = 0.03  # [rad] how far along a null direction a self-motion is followed
-STEPS = np.array([[STEP], [10 * STEP]])  # a short one and a long one
+STEP = 0.03  # distance [rad] along a null direction up to which a self-motion is followed
+STEPS = np.array([[STEP], [10 * STEP]])  # steps [rad] along a null direction: a short one and a long one
 
 
 def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: Bool, curve: Bool) -> None:
@@ -182,32 +182,32 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
     row, push = null_directions(arm.n, V, nullity)
-    # Most candidates fall back at once. Where several directions are lost, a short step is drawn back to the meeting.
+    # The first pass decides which candidates do not move, most: their residual exceeds `GROWTH`. Where several
+    # directions are lost, its step is long: a short one would be drawn back to the meeting.
     several = nullity[row] > 1
     first = np.where(several, 10 * STEP, STEP)
-    _, _, grown = push_along(arm, task, q[row], first, push, target[row])
-    going = np.flatnonzero(grown <= tol.GROWTH)
-    # most of those that lose one direction fall back from a longer step
-    alone = ~several[going] & (grown[going] * first[going] > tol.CLOSED)
+    _, _, residual = push_along(arm, task, q[row], first, push, target[row])
+    going = np.flatnonzero(residual <= tol.GROWTH)
+    # The second pass decides this of those that lose one direction and miss by more than rounding, by a longer step.
+    alone = ~several[going] & (residual[going] * first[going] > tol.CLOSED)
     if alone.any():
         tried = going[alone]
-        _, _, grown = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
-        alone[alone] = ~(grown <= tol.GROWTH)
+        _, _, residual = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
+        alone[alone] = ~(residual <= tol.GROWTH)
         going = going[~alone]
     if not len(going):
         return moving, joints
     row, push, several = row[going], push[going], several[going]
-    # a short step and a long one, to all of it and to a part, both ways, in one call: (2, 2, 2, m, n); a joint that
-    # rests at a double root comes half the way back in each
+    # Each posture takes a short and a long step, whole and in part, both ways, in one call: (2, 2, 2, m, n); a joint
+    # that rests at a double root comes half the way back in each.
     ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
     start = q[row] + ways * push * unit
     landed, size = pull_back(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
     away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
-    grown = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
-    short, long = (grown <= tol.GROWTH * STEPS) & _equally_long(away, push)
-    # where the residual grows at all, it must do so slowly as far as the long step: near a fold the first tenth of a
-    # radian costs nothing
-    along = (short & ((grown[0] <= tol.CLOSED) | long)) | (long & several)
+    residual = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
+    short, long = (residual <= tol.GROWTH * STEPS) & _equally_long(away, push)
+    # A residual above rounding must stay small up to the long step: a fold's first tenth of a radian shows nothing.
+    along = (short & ((residual[0] <= tol.CLOSED) | long)) | (long & several)
     np.logical_or.at(moving, row, along)
     np.logical_or.at(joints, row, along[:, None] & _moving_joints(away, long))
     return moving, joints

@@ -27,8 +27,8 @@ from armkin.model.arm import Arm, from_links
 from armkin.model.joint_chain import Chain, is_parallel, reverse_chain
 from armkin.model.rotation import inverse, rotation_about
 
-PHASE = 0.7321  # [rad]
-NAME = "general elimination"
+PHASE = 0.7321  # angle [rad] of the plane's arbitrary turn
+NAME = "general elimination"  # name of the method, as a solution shows it
 _POSE = Task("pose", 3, np.zeros((0, 6)), np.zeros(0), "full")
 
 

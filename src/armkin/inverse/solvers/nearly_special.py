@@ -37,10 +37,10 @@ from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.arm import Arm
 
 CHUNK = 1024  # poses corrected at once
-NAMED_AT_ONCE = 256  # branches are named: buffers of so many are kept
+NAMED_AT_ONCE = 256  # targets whose branches are named at once: buffers of so many are kept
 SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
-APART = 0.5  # [rad] a branch may be from the similar arm's whose name it takes
-RINGS = (1.0, 5.0, 25.0)  # and to find seeds on the other side of a singularity
+APART = 0.5  # distance [rad] of a branch from the similar arm's whose name it takes
+RINGS = (1.0, 5.0, 25.0)  # factors on the distance from the class, for seeds on the other side of a singularity
 
 
 def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:

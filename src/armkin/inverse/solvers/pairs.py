@@ -28,12 +28,12 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import rotation_about
 from armkin.model.units import radian_or_reach
 
-AROUND = 10.0  # distances from the class by which a target is moved to see whether its branches stay
+AROUND = 10.0  # distance, in distances from the class, by which a target is moved to see whether its branches stay
 # square of half of what lies between complex roots, up to which they may be one real root
 TOUCHING = tol.APART_ROOTS**2
-MOVED = 0.3  # [rad, reaches] a pair may stand from the class's
-STEPS = 8  # of Newton's method for a pair,
-LARGEST = 0.3  # [rad, reaches] and of each
+MOVED = 0.3  # distance [rad, reaches] of a pair from the class's, at most
+STEPS = 8  # steps of Newton's method for a pair
+LARGEST = 0.3  # length [rad, reaches], at most, of each step for a pair
 
 
 def targets_around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:

@@ -34,7 +34,7 @@ from armkin.model.joint_chain import Chain
 from armkin.model.rotation import inverse
 
 CHUNK = 1024  # targets solved at once
-ALL = np.array(list(permutations(range(4))))  # which of four roots goes where
+ALL = np.array(list(permutations(range(4))))  # orders of four roots: which of them goes where
 
 
 class _Roots(NamedTuple):

@@ -7,9 +7,9 @@ import numpy as np
 from armkin.formula.arrays import Array, wrap_angle
 from armkin.inverse.tasks.task import NO_DIRECTION, Task
 
-SMALL_TURN = 1e-8  # by how much the trace of a small rotation is below 3
+SMALL_TURN = 1e-8  # difference of a small rotation's trace from 3
 HALF_TURN = 1e-6  # sine of the angle of a rotation that is about half a turn
-TINY = 1e-300  # keeps a quotient finite where its divisor is zero
+TINY = 1e-300  # floor of a divisor: it keeps a quotient finite where the divisor is zero
 
 
 def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -> Array:

@@ -37,9 +37,9 @@ LABELS = {
 }
 ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
 ROUNDED = 1e-14  # distance from orthonormal columns that needs no correction
-NO_DIRECTION = 1e-12  # a vector that short
-AROUND = 1e-4  # [reaches, rad] how far targets around one are from it
-LARGEST = 1e15  # [mm, rad] of a target: its powers in the polynomials stay finite
+NO_DIRECTION = 1e-12  # length of a vector that has no direction
+AROUND = 1e-4  # distance [reaches, rad] of the targets around one from it
+LARGEST = 1e15  # size [mm, rad] of a target, at most: its powers in the polynomials stay finite
 
 
 @dataclass(frozen=True, eq=False)

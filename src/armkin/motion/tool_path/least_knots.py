@@ -10,15 +10,15 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout, least_squares
 from armkin.motion.tool_path.chords import SHORT, Chords
 
-_CHORD = 0.85  # share of the tolerance, beside chords
-_EVEN = 8  # parts of a chord that is long beside a neighbour
-_SPARE = 0.98  # of what is allowed
-_POINTS, _LONGEST = 32, 20.0  # of a first interval: points, or [mm]
-_ROUNDS = 80
-_TELLING, _CLOSE = 5, 0.05  # points that tell misfit from noise; of what is allowed: such a misfit is none
-_PATIENCE = 4  # rounds of weighing before an interval is divided
-_HEAVIEST = 1e6  # a point's weight
-_HOPELESS = 2.5  # times what is allowed: dividing helps, weights do not
+_CHORD = 0.85  # A curve beside chords is allowed this share of the tolerance.
+_EVEN = 8  # A chord that is long beside a neighbour is divided into so many parts.
+_SPARE = 0.98  # A fit is held to this share of the allowed misfit, so that rounding stays within it.
+_POINTS, _LONGEST = 32, 20.0  # A first interval has at most so many points and so many mm.
+_ROUNDS = 80  # The intervals are divided in at most so many rounds.
+_TELLING, _CLOSE = 5, 0.05  # So many points tell misfit from noise; this share of the allowed misfit is none.
+_PATIENCE = 4  # Points are weighed in so many rounds before an interval is divided.
+_HEAVIEST = 1e6  # A point has at most this weight.
+_HOPELESS = 2.5  # A misfit of so many times what is allowed needs a division: weights do not help.
 
 
 @dataclass(frozen=True)
