@@ -245,6 +245,17 @@ def test_functions_have_at_most_15_branches() -> None:
 BRANCHES = {ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case}
 
 
+def test_no_conditional_expression_stands_in_another() -> None:
+    """A reader holds one condition at a time: the inner choice gets a name, or an `if`."""
+    nested = {
+        f"{module}:{node.lineno}"
+        for module, path in MODULES.items()
+        for node in _tree_nodes(path)
+        if isinstance(node, ast.IfExp) and sum(isinstance(inner, ast.IfExp) for inner in ast.walk(node)) > 1
+    }
+    assert not nested
+
+
 def _branch_count(function: ast.FunctionDef) -> int:
     """Ways through a function, one more than its decisions; functions in it are counted by themselves."""
     left: list[ast.AST] = [*function.body]

@@ -200,10 +200,8 @@ def standing_joints(arm: Arm, text: str, option: str) -> Array:
 def prepare_motion(arm: Arm, machine: Backend, text: str | None, assume: Array | None) -> None:
     """Get the board ready to move; says so if it takes the arm to stand somewhere on the operator's word."""
     if machine.prepare(assume=assume) and text is not None:
-        place_text = (
-            "in its home pose" if text == "home" else f"in its pose {text}" if text in arm.poses else f"at {text}"
-        )
-        output.note(f"the board takes the arm to stand {place_text}")
+        place_text = f"in its pose {text}" if text in arm.poses else f"at {text}"
+        output.note(f"the board takes the arm to stand {'in its home pose' if text == 'home' else place_text}")
 
 
 def where_text(arm: Arm, answer: Mapping[str, Any]) -> str:

@@ -233,9 +233,10 @@ def _lacks_text(lacks: dict[str, list[str]], add: list[str]) -> str:
     send = [words for words in lacks["send"] if words not in lacks["simulate"]]
     rows = {"pulses": lacks["pulses"], "simulate": lacks["simulate"], "send": send}
     rows["home"] = [words for words in lacks["home"] if words not in lacks["send"]]
+    builds_on = {"send": "simulate", "home": "send"}
     lines = []
     for name, words in rows.items():
-        more = ["the same"] if name in ("send", "home") and lacks["simulate" if name == "send" else "send"] else []
+        more = ["the same"] if name in builds_on and lacks[builds_on[name]] else []
         text = f"not yet: {'; '.join(more + words)}" if more or words else "ready"
         lines.append(wrap_text(text, f"  {name:9}", " " * 11))
     if add:

@@ -79,7 +79,8 @@ def _free_name(name: str, used: tuple[str, ...]) -> str:
 
 def _joint_lines(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
     slides, limited = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
-    kind = "prismatic" if slides else "revolute" if limited else "continuous"
+    rotary_kind = "revolute" if limited else "continuous"
+    kind = "prismatic" if slides else rotary_kind
     unit = METRE if slides else 1.0
     speed = 0.0 if math.isnan(arm.max_speed[i]) else float(arm.max_speed[i]) / unit
     ends = f'lower="{_real_text(arm.lower[i] / unit)}" upper="{_real_text(arm.upper[i] / unit)}" ' if limited else ""

@@ -90,8 +90,10 @@ def mul(a: Entry, b: Entry) -> Entry:
     (0.0, -3.0)
     """
     for factor, cofactor in ((a, b), (b, a)):
-        if isinstance(factor, float) and factor in (0.0, 1.0, -1.0):
-            return 0.0 if factor == 0.0 else cofactor if factor == 1.0 else -cofactor
+        if isinstance(factor, float) and factor == 0.0:
+            return 0.0
+        if isinstance(factor, float) and abs(factor) == 1.0:
+            return cofactor if factor == 1.0 else -cofactor
     return a * b
 
 

@@ -144,7 +144,7 @@ class _Writer:
         """A product, a quotient, a sum or a difference."""
         if a.constant is not None and b.constant is not None and op != "divide":
             x, y = (-c if minus else c for c, minus in ((a.constant, a.minus), (b.constant, b.minus)))
-            return self.constant(x * y if op == "multiply" else x + y if op == "add" else x - y)
+            return self.constant({"multiply": x * y, "add": x + y, "subtract": x - y}[op])
         if op in ("add", "subtract"):
             return self._sum(a, _flip_sign(b, op == "subtract"))
         minus = a.minus != b.minus

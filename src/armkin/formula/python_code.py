@@ -92,7 +92,8 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
     def value(x: Any, index: tuple[int, ...]) -> Value | str:
         """What an argument is on a branch: a value, or a constant's digits."""
         axes = axes_of(x)
-        place = tuple(0 if size == 1 else i for size, i in zip(axes, index[-len(axes) :], strict=True)) if axes else ()
+        last = index[len(index) - len(axes) :]
+        place = tuple(0 if size == 1 else i for size, i in zip(axes, last, strict=True))
         if isinstance(x, Node):
             return same.get(key := (id(x), place), key)
         return repr(float(np.asarray(x)[(*place, 0)] if np.ndim(x) else x))

@@ -183,8 +183,10 @@ def branch_signs(x: Any, zeros: bool = False) -> bool:
 
 def _split_sign(x: Any) -> tuple[Sign, Any]:
     """A value as a sign and what is left: minus moves out of nodes, signs of branches out of nodes and constants."""
+    if isinstance(x, Node) and x.op == "negative":
+        return -1.0, x.args[0]
     if isinstance(x, Node):
-        return (-1.0, x.args[0]) if x.op == "negative" else x.args if branch_signs(x) else (1.0, x)
+        return x.args if branch_signs(x) else (1.0, x)
     if _ndim(x) and np.all(abs(x) == abs(x).flat[0]) and x.flat[0]:
         return _sign_product(np.sign(x), 1.0), abs(float(x.flat[0]))
     return 1.0, x

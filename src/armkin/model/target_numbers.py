@@ -12,12 +12,12 @@ if TYPE_CHECKING:
 
     from armkin.formula.arrays import Array
 
-_ANGLES = ("theta", "phi", "roll", "pitch", "yaw")
+_UNITS = dict.fromkeys(("theta", "phi", "roll", "pitch", "yaw"), "deg") | dict.fromkeys(("ax", "ay", "az"), "")
 
 
 def label_units(labels: Sequence[str]) -> list[str]:
     """Unit of each of a target's numbers: "mm", "deg", or "" for a direction's components."""
-    return ["deg" if name in _ANGLES else "" if name in ("ax", "ay", "az") else "mm" for name in labels]
+    return [_UNITS.get(name, "mm") for name in labels]
 
 
 def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:

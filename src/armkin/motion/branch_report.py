@@ -131,7 +131,10 @@ def wrist_pass_lines(plan: PathPlan) -> list[str]:
 def plan_fields(plan: PathPlan) -> dict[str, Any]:
     """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
     arm = plan.arm
-    worst = plan.nearest_singularity
+    singularity = None
+    if plan.nearest_singularity is not None:
+        s, condition, _ = plan.nearest_singularity
+        singularity = {"s_mm": s, "condition": condition if np.isfinite(condition) else None}
     return {
         "task": None if plan.task is None else plan.task.name,
         "length_mm": plan.length,
@@ -150,9 +153,7 @@ def plan_fields(plan: PathPlan) -> dict[str, Any]:
         ],
         "branches": [_branch_fields(arm, branch) for branch in plan.branches],
         "limits": None,
-        "nearest_singularity": None
-        if worst is None
-        else {"s_mm": worst[0], "condition": worst[1] if np.isfinite(worst[1]) else None},
+        "nearest_singularity": singularity,
         **({} if plan.trajectory is None else _motion_fields(plan)),
         **_optional_fields(plan),
     }

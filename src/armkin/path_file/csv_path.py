@@ -91,8 +91,9 @@ def _filled_rows(text: str, name: str) -> list[Row]:
 def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str, int]) -> dict[str, float]:
     """A row's numbers by their columns, by their places without a header; an empty cell of an option is none."""
     values: dict[str, float] = {}
+    columns = [str(i) for i in range(len(row))] if header is None else header
     for i, cell in enumerate(row):
-        value, key = _cell_number(cell), f"{i}" if header is None else header[i] if i < len(header) else ""
+        value, key = _cell_number(cell), columns[i] if i < len(columns) else ""
         if value is None and key in _OPTIONS and not cell.strip():
             continue
         if value is None or abs(value) > LARGEST:

@@ -16,6 +16,7 @@ from armkin.path_file.path_keys import MOST_POINTS, PathFile
 
 AXES = "XYZ"
 INCH = 25.4
+_UNITS = {20.0: INCH, 21.0: 1.0}  # [mm]
 _MOTION = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3"}
 _PLANES = {17.0: (0, 1, 2), 18.0: (2, 0, 1), 19.0: (1, 2, 0)}  # two axes of the plane, and the one across
 _SYSTEMS = {54.0: 1, 55.0: 2, 56.0: 3, 57.0: 4, 58.0: 5, 59.0: 6}
@@ -24,7 +25,7 @@ _IGNORED_G = {11.0: "G11", 29.0: "G29", 40.0: "G40", 49.0: "G49", 61.0: "G61", 6
 _GROUPS: dict[str, tuple[float, ...]] = {
     "motion": (0.0, 1.0, 2.0, 3.0),
     "plane": (17.0, 18.0, 19.0),
-    "units": (20.0, 21.0),
+    "units": tuple(_UNITS),
     "distance": (90.0, 91.0),
     "coordinate system": tuple(_SYSTEMS),
     "one-line": (4.0, 10.0, 28.0, 52.0, 92.0, 29.0, 11.0),
@@ -169,7 +170,7 @@ class _Program:
         return codes, m_codes, values
 
     def _unit_after(self, codes: list[float]) -> float:
-        return INCH if 20.0 in codes else 1.0 if 21.0 in codes else self.unit
+        return next((_UNITS[code] for code in codes if code in _UNITS), self.unit)
 
     def _switch(self, code: float, speed: float | None) -> None:
         """An M word: the gripper's, or ignored."""
@@ -198,8 +199,8 @@ class _Program:
         for code in codes:
             if code in _PLANES:
                 self.plane = code
-            elif code in (20.0, 21.0):
-                self.unit = INCH if code == 20.0 else 1.0
+            elif code in _UNITS:
+                self.unit = _UNITS[code]
             elif code in (90.0, 91.0):
                 self.absolute = code == 90.0
             elif code in _SYSTEMS:

@@ -92,7 +92,7 @@ def _draw_several(
     last = len(bones) - 1
     if in_turn:
         for k, bone in enumerate(bones):
-            label = legend[0] if k == 0 else legend[1] if k == last else None
+            label = {last: legend[1], 0: legend[0]}.get(k)
             drawing.draw_arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not legal[k])
         return
     # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
@@ -266,7 +266,9 @@ class _Drawing:
         """Title, legend beside the axes, and limits that fill what is left."""
         self.figure.text(0.03, 0.97, title, fontsize=min(13.0, 800 / max(len(title), 1)), va="top", color=INK)
         self.figure.text(0.03, 0.92, note, fontsize=10, va="top", color=SOFT)
-        left = 0.02 if order is None else min(self._draw_legend(order, 0.895 if note else 0.935), 0.5)
+        left = 0.02
+        if order is not None:
+            left = min(self._draw_legend(order, 0.895 if note else 0.935), 0.5)
         if self.dimensions == 3:
             self.axes.set_position([left, 0.02, 0.98 - left, 0.86])
             true_proportions(self.axes, self.points, self.floor)

@@ -238,7 +238,8 @@ def _place_name(name: str) -> str:
 def _suggestion(path: Path) -> str | None:
     key, owner = str(path[-1]), _owner(path)
     belongs = any(key in _keys(model) for model in _models(path).values())
-    return None if belongs else _nearest_key(key, _keys(owner), {} if path[0] == "keep_out" else _SYNONYMS)
+    synonyms = {} if path[0] == "keep_out" else _SYNONYMS
+    return None if belongs else _nearest_key(key, _keys(owner), synonyms)
 
 
 def _keys(owner: type[BaseModel]) -> list[str]:

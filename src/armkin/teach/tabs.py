@@ -120,6 +120,7 @@ class Tabs:
                     tab.publish(topic, message)
 
     def _announce(self) -> None:
+        other = "another" if self._control else "nobody"
         for tab in self._tabs.values():
-            state = "yours" if self._control == tab.id else "another" if self._control else "nobody"
-            tab.publish("control", {"holder": state, "pages": len([t for t in self._tabs.values() if t.listening])})
+            holder = "yours" if self._control == tab.id else other
+            tab.publish("control", {"holder": holder, "pages": len([t for t in self._tabs.values() if t.listening])})

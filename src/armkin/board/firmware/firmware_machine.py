@@ -246,5 +246,5 @@ class FirmwareMachine(Backend):
 def joints_text(arm: Arm, q: Array) -> str:
     """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
     values = [f"{name} = {value:.4f}" for name, value in zip(arm.joint_names, joints_out(arm, q), strict=True)]
-    words = "mm" if arm.prismatic.all() else "deg" if not arm.prismatic.any() else "(deg, mm)"
-    return f"{', '.join(values)} {words}"
+    units = sorted({"mm" if slides else "deg" for slides in arm.prismatic})
+    return f"{', '.join(values)} {units[0] if len(units) == 1 else '(deg, mm)'}"

@@ -183,7 +183,8 @@ def motion_batches(
     begins = not sizes
     while segments := segments + list(islice(source, max(0, _BATCH[1] + 1 - len(segments)))):
         fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
-        most = sizes.pop(0) if sizes else _BATCH[0] if line.noisy else min(fits, _BATCH[1])
+        fits = _BATCH[0] if line.noisy else min(fits, _BATCH[1])
+        most = sizes.pop(0) if sizes else fits
         begins = False
         n = _fitting_count(segments, most, room)
         part, segments = segments[:n], segments[n:]

@@ -160,4 +160,6 @@ def _steps_per_unit(section: Mapping[str, Any]) -> float | None:
 
 
 def _value_text(value: object) -> str | None:
-    return None if value is None else f"{value:g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:g}"
+    return None if value is None else str(value)

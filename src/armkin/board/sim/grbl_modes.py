@@ -86,7 +86,8 @@ class Modes:
     def parameters(self) -> list[str]:
         """The answer to ``$#``."""
         rows = [f"[{name}:{_join_values(values)}]" for name, values in self.offsets.items()]
-        tool = _join_values(self.tool) if self.hal else f"{self.tool[-1 if self.axes < 3 else 2]:.3f}"
+        length_axis = -1 if self.axes < 3 else 2
+        tool = _join_values(self.tool) if self.hal else f"{self.tool[length_axis]:.3f}"
         return [*rows, f"[G92:{_join_values(self.g92)}]", f"[TLO:{tool}]", f"[PRB:{_join_values([0.0] * self.axes)}:0]"]
 
     # Lines
@@ -155,7 +156,9 @@ class Modes:
 
     def _goal(self, axes: dict[int, float], position: Sequence[float], *, absolute: bool) -> list[float]:
         """Where the given axes go, in machine units; absolute: they are in these."""
-        zero = [0.0] * self.axes if absolute else position if self.relative else self.work()
+        zero = position if self.relative else self.work()
+        if absolute:
+            zero = [0.0] * self.axes
         return [axes[k] + zero[k] if k in axes else position[k] for k in range(self.axes)]
 
     def _set_offset(self, words: Words, axes: dict[int, float], position: Sequence[float]) -> None:

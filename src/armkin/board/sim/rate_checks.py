@@ -18,7 +18,7 @@ def times_valid(s: Segment, least: int) -> bool:
     least += least // 4 if s.quick else 0
     if s.ticks == 0 or s.interval < least or (s.bend and s.ticks > 1 << (10 if s.quick else 14)):
         return False
-    turns = s.last_add < 0 if s.add > 0 else s.last_add > 0 if s.add < 0 else s.bend != 0
+    turns = s.add * s.last_add < 0 if s.add else s.bend != 0
     return (
         not turns
         and abs(s.last_add + 0.5) < 1 << 23

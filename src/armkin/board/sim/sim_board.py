@@ -87,7 +87,8 @@ class SimBoard:
             _RetainedState(setup.packed_image(), setup.drivers, known_axes, counts) if still and not power else None
         )
         self._boots = 0 if power else self._boots
-        self._power_up(0 if self.hidden_cause else 1 if power else 2, motors.axes.net, retained)
+        cause = 1 if power else 2
+        self._power_up(0 if self.hidden_cause else cause, motors.axes.net, retained)
 
     def _power_up(self, cause: int, net: list[int], retained: _RetainedState | None) -> None:
         self._splitter = protocol.Splitter(self.board.frame)

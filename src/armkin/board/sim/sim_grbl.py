@@ -200,8 +200,9 @@ class Grbl(SimulatedTime):
     def _state_text(self) -> str:
         if self.state != "Idle" or not (self._holding or any(block.line for block in self._blocks)):
             return self.state
-        held = "Hold:0" if self._is_standing() else "Hold:1"
-        return held if self._holding else "Jog" if self._blocks[0].jog else "Run"
+        if self._holding:
+            return "Hold:0" if self._is_standing() else "Hold:1"
+        return "Jog" if self._blocks[0].jog else "Run"
 
     def _report_line(self) -> str:
         place, shift, bits = _machine_position(self.settings, self.steps), self.modes.work(), int(self.settings[10])
@@ -234,10 +235,11 @@ class Grbl(SimulatedTime):
         return True
 
     def _obey(self, line: str) -> None:
-        error = (
-            11 if len(line) >= _LINE and not self.hal else self._run_system_command(line[1:]) if line[:1] == "$" else -2
-        )
-        if error == -2:
+        if len(line) >= _LINE and not self.hal:
+            error = 11
+        elif line.startswith("$"):
+            error = self._run_system_command(line[1:])
+        else:
             error = 9 if line and self.state == "Alarm" else self._run_gcode(line)
         if error >= 0:
             self._send("ok" if error == 0 else f"error:{error}")
@@ -311,9 +313,8 @@ class Grbl(SimulatedTime):
             return 22
         modes = self.modes
         saved = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
-        goal = modes.obey(
-            Words(words.codes | {1.0, 94.0}, None, words.values), _machine_position(self.settings, position)
-        )
+        straight = Words(words.codes | {1.0, 94.0}, None, words.values)
+        goal = modes.obey(straight, _machine_position(self.settings, position))
         feed = modes.feed
         modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = saved
         if goal is not None:
@@ -322,9 +323,8 @@ class Grbl(SimulatedTime):
 
     def _plan_block(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:
         rapid = jog is None and self.modes.motion == 0.0
-        feed = math.inf if rapid else self.modes.feed if jog is None else jog
-        block = _block_to(self.settings, start, goal, feed / 60, jog is not None)
-        if block is not None:
+        feed = self.modes.feed if jog is None else jog
+        if block := _block_to(self.settings, start, goal, math.inf if rapid else feed / 60, jog is not None):
             block.feed *= block.length if self.modes.inverse and not rapid else 1.0
             self._blocks.append(block)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -115,8 +116,8 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
 
     q = units.joints_in(arm, chunk.values)
     F = armkin.frames(arm, q) if with_frames else None
-    poses = armkin.compile(arm).fk(q) if compiled else armkin.fk(arm, q) if F is None else F[:, -1]
-    T = poses + 0.0  # no -0.0
+    fk = armkin.compile(arm).fk if compiled else partial(armkin.fk, arm)
+    T = (fk(q) if F is None or compiled else F[:, -1]) + 0.0  # no -0.0
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)

@@ -74,7 +74,8 @@ def _lost_steps(arm: Arm, lost: Sequence[LostSteps]) -> list[dict[str, Any]]:
     rows = []
     for search in lost:
         slides = arm.prismatic[arm.joint_names.index(search.joint)]
-        difference = None if search.difference is None else search.difference / (1.0 if slides else units.DEGREE)
+        unit = 1.0 if slides else units.DEGREE
+        difference = None if search.difference is None else search.difference / unit
         rows.append({"joint": search.joint, "steps": search.steps, "difference": difference})
         if search.steps is not None and abs(search.steps) > 1:
             difference_text = f"({difference:.3f} {'mm' if slides else 'deg'})"

@@ -22,6 +22,7 @@ def schema(
 
     if path and scene:
         raise UsageError("--path and --scene: give one of the two")
-    made = scene_schema() if scene else (path_file if path else robot_file).json_schema()
+    reader = path_file if path else robot_file
+    made = scene_schema() if scene else reader.json_schema()
     with output.destination(out) as write:
         write(json.dumps(made, indent=2) + "\n")

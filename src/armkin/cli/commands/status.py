@@ -44,8 +44,10 @@ def status(
             return {**head, **where_arm_stands(machine), **machine.report()}
 
         def text(status: dict[str, Any]) -> str:
-            words = _servos_text if "servos" in status else _grbl_text if "settings" in status else _text
-            return render.to_json(status) + "\n" if json else board_link.where_text(arm, status) + words(status)
+            report_text = _grbl_text if "settings" in status else _text
+            if "servos" in status:
+                report_text = _servos_text
+            return render.to_json(status) + "\n" if json else board_link.where_text(arm, status) + report_text(status)
 
         if watch:
             _print_changes(text(status_json()) for _ in _until_signal(machine.refresh, board.stop))

@@ -85,7 +85,9 @@ def workspace(
     measures, keep = _measures_and_kept(measure, None if plot is None else shade)
     count = None if samples is None else whole_number(samples, "--samples", 1, MOST)
     points = None if grid is None else _grid_points(grid)
-    total = count or 100_000 if points is None else math.prod(points * arm.n if len(points) == 1 else points)
+    total = count or 100_000
+    if points is not None:
+        total = math.prod(points * arm.n if len(points) == 1 else points)
     with output.progress("samples", total) as tick:
         survey = armkin.workspace(
             arm,

@@ -78,7 +78,7 @@ def zero(
         lerobot_zero.record_zeros(board, robot, source, pose, out, json, check)
         return
     q = units.joints_in(arm, arguments.joint_list(arm, pose or "home", "--pose"))
-    jaw = None if gripper is None else board.grip_value(gripper if gripper in _ENDS else number(gripper, "--gripper"))
+    jaw = None if gripper is None else _jaw_value(board, gripper)
     with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
         name = machine.port.name
         counts, grips = board.zero(jaw)
@@ -90,6 +90,10 @@ def zero(
         answer["gripper_zero"] = None if grips is None else grips[1]
         with output.destination(None) as write:
             write(f"{render.to_json(answer)}\n" if json else _text(board, counts, zeros, grips))
+
+
+def _jaw_value(board: Board, text: str) -> float:
+    return board.grip_value(text if text in _ENDS else number(text, "--gripper"))
 
 
 def _write_robot_file(arm: Arm, robot: str, zeros: Sequence[int], grips: tuple[int, int] | None, out: str) -> None:

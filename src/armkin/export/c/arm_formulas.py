@@ -45,7 +45,8 @@ def record_candidates(
         outputs = recorded_formula(inputs[:entries], held)
         return outputs[:-1] if prefer else outputs
 
-    return recording.record(formula, entries + (sum(1 if p else 2 for p in arm.prismatic) if prefer else 0))
+    free_numbers = 2 * n - int(arm.prismatic.sum())
+    return recording.record(formula, entries + (free_numbers if prefer else 0))
 
 
 def record_target(arm: Arm, task: Task) -> recording.Recording:

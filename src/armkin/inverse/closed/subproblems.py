@@ -114,10 +114,8 @@ class Candidates(NamedTuple):
     def values(self) -> list[Entry]:
         """Joint values [rad | mm]."""
         angles = self.angles or [None] * len(self.pairs)
-        return [
-            c if s is None else arrays.arctan2(s, c) if angle is None else angle
-            for (c, s), angle in zip(self.pairs, angles, strict=True)
-        ]
+        known = [c if s is None else angle for (c, s), angle in zip(self.pairs, angles, strict=True)]
+        return [arrays.arctan2(s, c) if x is None else x for (c, s), x in zip(self.pairs, known, strict=True)]
 
     def reversed(self) -> Candidates:
         """The same for the chain walked the other way."""

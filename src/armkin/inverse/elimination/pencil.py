@@ -145,7 +145,8 @@ def _dialytic(hidden: int, dialytic: int, sliding: bool, wide: bool, third_slidi
     sliding, third_sliding: the dialytic joint, the third one is prismatic.
     """
     multipliers = _POWERS if sliding else _HALF_ANGLE
-    third = (_POWERS if third_sliding else _HALF_ANGLE) if wide else np.eye(3)[None]
+    third_multipliers = _POWERS if third_sliding else _HALF_ANGLE
+    third = third_multipliers if wide else np.eye(3)[None]
     unit = np.eye(27).reshape(27, 3, 3, 3)
     unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
     products: Array = np.einsum("xhjk,sjp,tkr->hxstpr", unit, multipliers, third)

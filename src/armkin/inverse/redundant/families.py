@@ -66,7 +66,8 @@ def families(
     roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
     stands = (newton.misses(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
-    chunk = CIRCLES if srs else AT_ONCE // SAMPLES if free.by_formula else TRACED
+    followed = AT_ONCE // SAMPLES if free.by_formula else TRACED
+    chunk = CIRCLES if srs else followed
     for k in range(0, len(goal), chunk):
         part = goal[k : k + chunk], nears[k : k + chunk]
         if srs:

@@ -14,7 +14,6 @@ six joints go straight to it, and the similar arm only names the branches.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -86,7 +85,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
 
 def _named_columns(alike: Geometry) -> int | None:
     """How many branches a class has names for; None of one that has no names."""
-    return math.prod(2 if label else 1 for label in alike.labels) if alike.labels else None
+    return 1 << sum(bool(label) for label in alike.labels) if alike.labels else None
 
 
 def _by_elimination(arm: Arm, task: Task, alike: Geometry, gap: float, general_: Geometry | None) -> Geometry | None:

@@ -81,8 +81,9 @@ class Chain:
     def _joint_reach(self) -> Int:
         """The first sample, counted from `first`, that each joint cannot go on to, from every sample: (len, n)."""
         N = len(self.q)
+        own = np.arange(N)  # where a joint without copies ends; no copy ends earlier
         ends = [
-            np.full(N, N) if end is None else end.max(axis=0) if len(end) else np.arange(N) for _, end in self._copies
+            np.full(N, N) if end is None else np.maximum(own, end.max(axis=0, initial=0)) for _, end in self._copies
         ]
         return np.stack(ends, axis=1)
 

@@ -171,7 +171,8 @@ def _follow_run(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
                     candidate = a * current + b
                     if candidate < value:
                         value = candidate
-            current = top if top < value else value if value > 0.0 else 0.0
+            value = value if value > 0.0 else 0.0
+            current = top if top < value else value
             values.append(current)
         y[k + 1 : end + 1] = values
         if current == last or end == len(y) - 1:

@@ -86,7 +86,8 @@ class Window:
         """Send new frames as far as credit and window allow, and all of them again when nothing has come for long."""
         begun = self._line.port.now()
         self._fill()
-        patience = _EAGER if self._line.noisy else self._line.slowest + (_GAP if self._gap else _RESEND)
+        beyond_slowest = _GAP if self._gap else _RESEND
+        patience = _EAGER if self._line.noisy else self._line.slowest + beyond_slowest
         if self._sent and begun - self._line.clear > patience:
             self._go_back(0, len(self._sent[0][1]))
         elif self._gap and not self._line.noisy and begun > self._deaf:

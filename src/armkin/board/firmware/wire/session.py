@@ -71,7 +71,8 @@ class Session:
                 del leave[0]
                 nonce = _new_nonce()  # a new session: a board counts those words as damaged frames
             if since < _TRIES or since > _AGAIN:
-                info = self._greet(nonce, 0.06 if since < _TRIES else 0.15 if since < 3.0 else 0.4)
+                late_patience = 0.15 if since < 3.0 else 0.4
+                info = self._greet(nonce, 0.06 if since < _TRIES else late_patience)
                 if info is not None:
                     return info
             else:
