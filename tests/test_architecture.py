@@ -161,6 +161,14 @@ def test_no_row_of_the_table_contradicts_another() -> None:
     assert _find_circle(rows) is None
 
 
+def test_the_rooms_are_those_of_the_table() -> None:
+    page = SOURCE.parent / "docs/architecture.md"
+    table = page.read_text().split("## Rooms")[1].split("\n\n")[1]
+    rooms = re.findall(r"^\| `([a-z_/]+)` \|", table, re.M)
+    assert len(rooms) == len(set(rooms))
+    assert set(rooms) == {*MAY_IMPORT, "cli"}
+
+
 def test_no_module_imports_itself_by_way_of_others() -> None:
     assert _find_circle({module: _imports_of(module) for module in MODULES}) is None
 

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-from test_architecture import MAY_IMPORT
 
 import armkin
 from armkin.errors import UsageError
@@ -28,13 +27,6 @@ def test_every_file_that_a_page_names_is_there(page: Path) -> None:
         if "yours" not in name and not any((top / name).exists() for top in (ROOT / "src" / "armkin", ROOT))
     }
     assert not missing
-
-
-def test_the_rooms_are_those_of_the_table() -> None:
-    table = HOUSE.read_text().split("## Rooms")[1].split("\n\n")[1]
-    rooms = re.findall(r"^\| `([a-z_/]+)` \|", table, re.M)
-    assert len(rooms) == len(set(rooms))
-    assert set(rooms) == {*MAY_IMPORT, "cli"}
 
 
 def test_links_between_pages_lead_somewhere() -> None:

@@ -16,10 +16,10 @@ import numpy as np
 
 import armkin
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
-from redundant_arms import covers_value, held_answers, redundant_postures  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
+from redundant_arms import covers_value, held_answers, redundant_postures
 
-from armkin.inverse.solvers.redundant import redundancy  # noqa: E402
+from armkin.inverse.solvers.redundant import redundancy
 
 ARMS = ("panda", "iiwa7", "kinova_gen3")
 AT_ONCE = 250

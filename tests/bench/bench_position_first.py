@@ -18,8 +18,8 @@ import numpy as np
 import armkin
 from armkin.forward import tip_and_jacobian
 
-sys.path[:0] = [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
-from test_position_first import ARMS, random_targets  # noqa: E402
+sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
+from position_first_targets import ARMS, random_targets
 
 GRID = {1: 200, 2: 28}  # values of each joint but the first three, by how many these are
 STARTS = {1: 16, 2: 8}

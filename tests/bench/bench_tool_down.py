@@ -15,9 +15,9 @@ from bench_batches import c_alone, least_cpu
 
 import armkin
 
-sys.path += [str(Path(__file__).parents[1] / "inverse"), str(Path(__file__).parents[1] / "helpers")]
+sys.path.append(str(Path(__file__).parents[1] / "inverse"))
 
-from test_tool_down import arm_and_screws  # of the inverse tests
+from gen3_lite import arm_and_screws  # of the inverse tests
 
 ARMS = ("jaco_j2n6s300", "gen3_lite", "fanuc_crx10ia", "xarm6", "mycobot_280")
 WAYS = {"up": (0, 0, 1), "down": (0, 0, -1), "+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0)}

@@ -27,8 +27,8 @@ import truth
 from geometries import CLASSES, random_case, right_angles
 from geometries import case_of as case_of
 from ik_checks import Array, Report, examine_answers, not_found, random_joints
-from test_every_branch import NAMES, shipped_arm
-from test_nearly_special import OFF, move_axes
+from moved_axes import OFF, move_axes
+from shipped_arms import NAMES, shipped_arm
 
 import armkin
 from armkin.errors import UsageError

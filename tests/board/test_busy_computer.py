@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_feetech_machine import ARM, connect_servos, servo_bus
+from three_servos import ARM, connect_servos, servo_bus
 
 from armkin.board.firmware.configuration import configure
 from armkin.board.firmware.firmware_machine import FirmwareMachine

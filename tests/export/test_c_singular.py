@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import truth
 from exported_c import Exported
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of

@@ -9,7 +9,7 @@ import oracle
 import pytest
 import truth
 from oracle import Goal, Screws
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 from truth import Array, Bool
 
 import armkin

@@ -7,7 +7,7 @@ import pytest
 import truth
 from geometries import case_of, right_angles
 from oracle import goal_of_joints
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 import armkin
 from armkin import Status

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import truth
 from oracle import goal_of_joints
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 import armkin
 from armkin import Status

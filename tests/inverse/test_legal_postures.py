@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oracle import goal_of_joints, pose_error
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 import armkin
 from armkin import Status

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 import armkin
 import right_angles

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from oracle import goal_of_joints
-from test_every_branch import UNLIKE, shipped_arm
+from shipped_arms import UNLIKE, shipped_arm
 
 import armkin
 from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number

@@ -7,8 +7,8 @@ import pytest
 import truth
 from geometries import AXIS, Case, case_of, random_case, random_screws
 from ik_checks import examine_answers, random_joints
+from moved_axes import move_axes
 from oracle import goal_of_joints
-from test_nearly_special import move_axes
 
 import armkin
 from armkin import Status

@@ -14,7 +14,7 @@ import pytest
 import truth
 from geometries import random_case
 from oracle import goal_of_joints, newton
-from test_every_branch import UNLIKE, shipped_arm
+from shipped_arms import UNLIKE, shipped_arm
 
 import armkin
 from armkin import Status

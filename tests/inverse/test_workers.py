@@ -6,7 +6,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from test_every_branch import shipped_arm
+from shipped_arms import shipped_arm
 
 import armkin
 from armkin.errors import UsageError
