@@ -325,6 +325,16 @@ def _is_public(node: ast.FunctionDef) -> bool:
     )
 
 
+def test_nothing_imports_from_a_test() -> None:
+    """What two tests share is a module beside them, or in `tests/helpers/`, named by what it holds."""
+    imports = {
+        f"{path.name}: {line}"
+        for path in Path(__file__).parent.rglob("*.py")
+        for line in re.findall(r"^ *(?:from|import) (?:\w+\.)*test_\w+.*", path.read_text("utf-8"), re.M)
+    }
+    assert not imports
+
+
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
 LISTED_ELSEWHERE = {  # the table of commands in docs/architecture.md; a kind is one file and no line elsewhere
     SOURCE / "armkin/cli/commands",
