@@ -289,7 +289,8 @@ def _single_pose(arm: Arm, q: Array) -> Array:
             Z[2, 3] = value
         else:
             c, s = (math.cos(value), math.sin(value)) if math.isfinite(value) else (math.nan, math.nan)
-            Z[0, 0], Z[0, 1], Z[1, 0], Z[1, 1] = c, -s, s, c
+            Z[0, 0] = Z[1, 1] = c
+            Z[0, 1], Z[1, 0] = -s, s
         T = T @ Z @ arm.link[i + 1]
     return np.asarray(T)
 

@@ -33,7 +33,8 @@ class Planner:
 
     def __init__(self, board: Board, speed: float, blend: float = 0.0) -> None:
         """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
-        self.arm, self.board, self.speed, self.blend = board.arm, board, speed, blend
+        self.arm, self.board = board.arm, board
+        self.speed, self.blend = speed, blend
         self.total_sent = Total(board.arm)  # what has been sent
 
     def counts(self, q: Array) -> list[int]:
@@ -60,7 +61,8 @@ class Total:
     """What plans, one after another, come to."""
 
     def __init__(self, arm: Arm, plans: Iterable[Planned] = ()) -> None:
-        self.arm, self.waypoints, self.segments, self.duration = arm, 0, 0, 0.0
+        self.arm = arm
+        self.waypoints, self.segments, self.duration = 0, 0, 0.0
         self.first: list[int] = []  # counts; none before the first plan
         self.last: list[int] = []
         self.speed: Array = np.zeros(arm.n)  # greatest of each joint

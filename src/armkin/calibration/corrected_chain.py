@@ -31,8 +31,10 @@ NEARLY_PARALLEL = 0.05  # [rad] below, the common normal is too far away to hang
 
 # The workshop prior: what a built arm differs from its table by (standard deviations). A base is put up by hand, and a
 # measuring tip is what its owner screwed on.
-LENGTH, TWIST, ZERO, SLIDE, RATIO = 0.5, math.radians(0.3), math.radians(1.0), 0.5, 0.003  # mm, rad, rad, mm, 1
-BASE, BASE_TURN, TOOL, TOOL_TURN = 200.0, math.radians(30.0), 20.0, math.radians(10.0)
+LENGTH, SLIDE, RATIO = 0.5, 0.5, 0.003  # [mm, mm, 1]
+TWIST, ZERO = math.radians(0.3), math.radians(1.0)
+BASE, TOOL = 200.0, 20.0  # [mm]
+BASE_TURN, TOOL_TURN = math.radians(30.0), math.radians(10.0)
 
 
 class Parameter(NamedTuple):
@@ -202,7 +204,8 @@ def _move_columns(T: Array, step: _Step, value: Array | float) -> Array:
     T, shift = T.copy(), np.asarray(value)[..., None]
     if step.turns:
         i, j = (step.axis + 1) % 3, (step.axis + 2) % 3
-        a, b, c, s = T[..., i].copy(), T[..., j].copy(), np.cos(shift), np.sin(shift)
+        a, b = T[..., i].copy(), T[..., j].copy()
+        c, s = np.cos(shift), np.sin(shift)
         T[..., i], T[..., j] = c * a + s * b, c * b - s * a
     else:
         T[..., 3] += shift * T[..., step.axis]

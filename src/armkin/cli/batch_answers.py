@@ -248,7 +248,8 @@ class _ToFile:
     """A batch whose answers become a file: more than one piece keep their answers beside it until all are there."""
 
     def __init__(self, batch: Batch, format: Format, job: Job, tally: Tally, size: int | None) -> None:
-        self.batch, self.format, self.job, self.tally = batch, format, job, tally
+        self.batch, self.format = batch, format
+        self.job, self.tally = job, tally
         self.path = str(batch.out)
         files.check_writable(self.path)
         identity = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}

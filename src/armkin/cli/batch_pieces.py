@@ -51,7 +51,8 @@ class Rows:
         values: Sequence[Sequence[float]] = (),
     ) -> None:
         """source: a name, or None for values that are there already; the rest: see `csv_to_numbers.Columns`."""
-        self.source, self.names, self.purpose, self.named, self.values = source, tuple(names), purpose, named, values
+        self.source, self.names, self.purpose = source, tuple(names), purpose
+        self.named, self.values = named, values
         if source is not None:
             files.protect_input(0 if source == "-" else source)  # before an output of that name is opened
 

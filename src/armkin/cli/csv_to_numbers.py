@@ -258,7 +258,8 @@ def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
         while lines + ends >= ROWS:
             cut = _end_of_lines(text, ROWS - lines)
             yield b"".join([*held, text[:cut]])
-            text, ends, held, lines, open_ = text[cut:], ends - (ROWS - lines), [], 0, 0
+            text, ends, held = text[cut:], ends - (ROWS - lines), []
+            lines = open_ = 0
         held.append(text)
         lines, open_ = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_ + len(text)
         if open_ >= LONGEST:  # no use in reading on

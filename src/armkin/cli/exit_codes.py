@@ -13,7 +13,11 @@ from armkin import errors
 from armkin.cli import output
 from armkin.cli.commands import COMMANDS
 
-RUNTIME, USAGE, NO_SOLUTION, ROBOT_FILE, LINK = 1, 2, 3, 4, 5  # of a batch: `cli.batch_answers.Tally`
+RUNTIME = 1  # of a batch: `cli.batch_answers.Tally`
+USAGE = 2
+NO_SOLUTION = 3
+ROBOT_FILE = 4
+LINK = 5
 
 EXIT_CODES: dict[type[errors.ArmkinError], int] = {
     errors.FileError: RUNTIME,

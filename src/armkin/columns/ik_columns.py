@@ -87,7 +87,8 @@ def _list_branches(
     request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
 ) -> BranchTable:
     s, block, scale = answers.s, answers.rows, units.joint_scale(request.arm)
-    q, within, free, valid = answers.q[block], answers.within_limits[block], answers.free[block], s.valid[block]
+    q, valid = answers.q[block], s.valid[block]
+    within, free = answers.within_limits[block], answers.free[block]
     allowed = free if request.branch is None else free & np.isin(s.branch[block], answers.names)
     if all_branches:
         unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
@@ -134,8 +135,8 @@ def _rank_branches(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> 
     rank = np.argsort(key, axis=1, kind="stable")
     mixed = np.flatnonzero((free != valid).any(axis=1))
     if len(mixed):
-        k, v, w, f = key[mixed], valid[mixed], within_limits[mixed], free[mixed]
-        rank[mixed] = np.lexsort((k, w & ~f, ~w, ~v), axis=-1)
+        w, f = within_limits[mixed], free[mixed]
+        rank[mixed] = np.lexsort((key[mixed], w & ~f, ~w, ~valid[mixed]), axis=-1)
     return rank
 
 

@@ -45,7 +45,8 @@ class Single:
 
         names: of that many branches, for classes that list no more rows than a target has branches; else None.
         """
-        self._call, self._shape, self._home, self._names = call, shape, home, names
+        self._call, self._shape = call, shape
+        self._home, self._names = home, names
         self._shared_fields = shared_fields | {
             "rounding": _read_only(0.0),
             "complete": _read_only(shared_fields["complete"]),

@@ -165,7 +165,8 @@ def _common_normal(link: Array) -> _Normal:
             theta = math.atan2(n[1], n[0])
         d_after = float((p[:2] - a * n) @ z[:2]) / sine**2
         d = float(p[2] - d_after * z[2])
-    c, s, ca, sa = math.cos(theta), math.sin(theta), math.cos(alpha), math.sin(alpha)
+    c, s = math.cos(theta), math.sin(theta)
+    ca, sa = math.cos(alpha), math.sin(alpha)
     turned = np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0, sa, ca]]).T @ link[:3, :3]
     return _Normal(theta, d, a, alpha, math.atan2(turned[1, 0], turned[0, 0]), d_after)
 

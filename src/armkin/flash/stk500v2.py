@@ -10,7 +10,9 @@ from armkin.board.ports import Port
 from armkin.errors import LinkError
 
 _START, _TOKEN = 0x1B, 0x0E
-_SIGN_ON, _ADDRESS, _ENTER, _LEAVE, _WRITE, _READ, _SIGNATURE = 0x01, 0x06, 0x10, 0x11, 0x13, 0x14, 0x1B
+_SIGN_ON, _ENTER, _LEAVE = 0x01, 0x10, 0x11
+_ADDRESS, _WRITE, _READ = 0x06, 0x13, 0x14
+_SIGNATURE = 0x1B
 _BEYOND_64K = 1 << 31
 _ANSWER = 1.0  # [s]
 

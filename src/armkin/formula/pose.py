@@ -39,13 +39,13 @@ def slide(P: Pose, d: Entry) -> Pose:
 
 def compose(P: Pose, Q: Pose) -> Pose:
     """``P Q``."""
-    x, y, z, p = P[0:3], P[3:6], P[6:9], P[9:12]
+    x, y, z = P[0:3], P[3:6], P[6:9]
     product: Pose = []
     for k in (0, 3, 6, 9):
         column = combine(Q[k], x, Q[k + 1], y)
         column = combine(1.0, column, Q[k + 2], z)
         if k == 9:
-            column = combine(1.0, column, 1.0, p)
+            column = combine(1.0, column, 1.0, P[9:12])
         product += column
     return product
 

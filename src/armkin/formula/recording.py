@@ -45,7 +45,8 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
     """
 
     def __init__(self, trace: Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...], number: int) -> None:
-        self.trace, self.op, self.args, self.axes, self.number = trace, op, args, axes, number
+        self.trace, self.number = trace, number
+        self.op, self.args, self.axes = op, args, axes
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or options:
@@ -119,7 +120,7 @@ class Trace:
         if _is_zero(a):
             return self._apply_sign(b, t)
         if _ndim(s) and not _ndim(t):
-            s, a, t, b = t, b, s, a
+            (s, a), (t, b) = (t, b), (s, a)
         relative = _sign_product(s, t)
         if _ndim(relative):
             return self._apply_sign(self.record("add", (a, self._apply_sign(b, relative))), s)

@@ -91,7 +91,8 @@ class Guard:
         a, b = segment_ends(self.arm, q)
         middle, way = (a + b) / 2, b - a
         half = np.sqrt(np.einsum("ksn,ksn->sn", way, way)) / 2
-        radius, moving, i, j = self.bodies.radius[self.bodies.owner][:, None], self.moving, self.ours, self.theirs
+        radius, moving = self.bodies.radius[self.bodies.owner][:, None], self.moving
+        i, j = self.ours, self.theirs
         most = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
         nearer = [half[moving]] * len(most)
         if len(i):

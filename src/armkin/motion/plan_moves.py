@@ -69,7 +69,8 @@ class Walk:
     current_moves = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, start: Array, options: PathOptions) -> None:
-        self.arm, self.file, self.pace, self.options = arm, file, pace, options
+        self.arm, self.file = arm, file
+        self.pace, self.options = pace, options
         with _errors_of_key(file, "task"):
             self.plan = PathPlan(arm, _task_or_none(arm, file, options.task or file.task), pace.tolerance, pace.speed)
         self.q = start  # where the joints are when all so far is done
@@ -102,10 +103,9 @@ class Walk:
 
     def plan_all(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
         """The plan of all moves; kinds: what each kind of them does."""
-        q = self.q
+        q, number = self.q, 0
         with _errors_of_key(self.file, "start"):
             self._begin()
-        number = 0
         while number <= len(self.file.moves):
             try:
                 self._carry_out_move(kinds, number)

@@ -308,7 +308,8 @@ def _absolute_values(command: str, v: list[float], position: Point) -> list[floa
 
 def _draw_curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
     """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before, `bent`."""
-    curve, start, first, end = "C" if kind in "CS" else "Q", pen.position, (v[0], v[1]), (v[-2], v[-1])
+    curve, start = "C" if kind in "CS" else "Q", pen.position
+    first, end = (v[0], v[1]), (v[-2], v[-1])
     if kind in "ST":
         before = bent[1] if bent is not None and bent[0] == curve else start
         first = (2 * start[0] - before[0], 2 * start[1] - before[1])
@@ -324,7 +325,8 @@ def _draw_curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point
 def _draw_arc(pen: _Outline, v: list[float]) -> None:
     """An elliptical arc by its ends (SVG 1.1, appendix F.6.5)."""
     (x1, y1), (x2, y2) = pen.position, (v[5], v[6])
-    rx, ry, turned, large, sweep = abs(v[0]), abs(v[1]), math.radians(v[2]), v[3] == 1, v[4] == 1
+    rx, ry, turned = abs(v[0]), abs(v[1]), math.radians(v[2])
+    large, sweep = v[3] == 1, v[4] == 1
     if (x1, y1) == (x2, y2):
         return
     if min(rx, ry) < _NO_RADIUS:

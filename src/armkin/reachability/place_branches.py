@@ -67,7 +67,8 @@ def branch_arc(arm: Arm, low: Array, high: Array, count: int, sense: int) -> tup
     """
     lower, upper = float(arm.lower[0]) - SLACK, float(arm.upper[0]) + SLACK
     if sense < 0:
-        low, high, lower, upper = -high, -low, -upper, -lower
+        low, high = -high, -low
+        lower, upper = -upper, -lower
     if not (math.isfinite(lower) and math.isfinite(upper)):
         return np.zeros(low.shape, np.intp), np.full(low.shape, count)
     step, low, high = TURN / count, np.nan_to_num(low), np.nan_to_num(high)

@@ -193,7 +193,8 @@ class _Run:
     def __init__(
         self, question: Question, out: str | None, engine: Engine, progress: Callable[[int], None] | None
     ) -> None:
-        self.question, self.out, self.engine, self.progress = question, out, engine, progress
+        self.question, self.out = question, out
+        self.engine, self.progress = engine, progress
         self.cells = self.reached = self.solves = 0
         self.volume = 0.0
         self.parts: Parts | None = None

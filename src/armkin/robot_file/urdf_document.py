@@ -135,7 +135,8 @@ class Tree:
     """Which link hangs on which, checked: every link has one parent at most, and there is no circle."""
 
     def __init__(self, name: str, links: list[str], joints: list[Joint], solids: Solids, visuals: Visuals) -> None:
-        self.name, self.links, self.solids, self.visuals = name, links, solids, visuals
+        self.name, self.links = name, links
+        self.solids, self.visuals = solids, visuals
         self.parent: dict[str, Joint] = {}  # link -> the joint that it hangs on
         self.children: dict[str, list[Joint]] = {link: [] for link in links}
         for joint in joints:

@@ -38,7 +38,8 @@ class BoardThread:
 
     def __init__(self, arm: Arm, port: str, baud: int | None, publish: Callable[[dict[str, Any]], None]) -> None:
         """Raises UsageError if the robot file does not say what the board must know."""
-        self.arm, self.port, self.baud, self.publish = arm, port, baud, publish
+        self.arm, self.port = arm, port
+        self.baud, self.publish = baud, publish
         self.board = board_of(arm, rehearsal=port == SIM)
         self.link: Port | None = None
         self.machine: Backend | None = None
@@ -68,7 +69,8 @@ class BoardThread:
         with self._lock:
             if self._doing or self._stop.is_set():
                 raise RefusedError(409, f"the arm is busy ({self._doing or 'stop'}): wait for it, or STOP")
-            self._job, self._doing, self._error, self.progress = (name, job), name, "", (0.0, 0.0)
+            self._job, self._doing = (name, job), name
+            self._error, self.progress = "", (0.0, 0.0)
             self.parts, self.progress_seconds = [], 0.0
         self._wake.set()
 

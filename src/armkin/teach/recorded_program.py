@@ -216,7 +216,8 @@ class Program:
         del self.moves[index], self.names[index]
 
     def _clear(self, fields: Mapping[str, Any]) -> None:
-        self.moves, self.names, self.head, self.via = [], [], {}, None
+        self.moves, self.names = [], []
+        self.head, self.via = {}, None
 
     def _set_blend(self, fields: Mapping[str, Any]) -> None:
         """A move's own blend radius; null: the program's."""

@@ -68,7 +68,8 @@ def skeleton(arm: Arm, q: ArrayLike) -> Skeleton:
     """The lines of a pose q (n,) [rad | mm]."""
     values, form = as_joints(arm, q), arm_shape(arm)
     T = arm.link[0]
-    path, joints, axes, slides = [*form.bodies[0]], [], [], []
+    path = [*form.bodies[0]]
+    joints, axes, slides = [], [], []
     for i, value in enumerate(values * arm.ratio):
         z = T[:3, 2]
         joint = T[:3, 3] + form.joint_offsets[i] * z

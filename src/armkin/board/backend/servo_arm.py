@@ -203,8 +203,8 @@ class ServoArm(Backend):
 
     def _follow(self, trajectory: Trajectory, report: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
-        begin = last = self.port.now()
-        watched, t, pace, stopping = begin, 0.0, 1.0, False
+        last = watched = self.port.now()
+        t, pace, stopping = 0.0, 1.0, False
         ramp = max(braking_time(trajectory), PERIOD)
         while t < trajectory.duration and pace > 0.0:
             present = self.port.now()

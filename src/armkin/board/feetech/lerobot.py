@@ -115,7 +115,8 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
     """
     calibrated = read_calibration(path)
     middle = np.zeros(arm.n) if pose is None else pose
-    motors, zero, limits, edits = list[Motor](), list[float](), list[tuple[float, float]](), Edits()
+    motors, zero, limits = list[Motor](), list[float](), list[tuple[float, float]]()
+    edits = Edits()
     for drive, gain in zip(arm.motors, arm.motor_gain, strict=True):
         j = int(np.flatnonzero(gain)[0])
         name = arm.joint_names[j]

@@ -9,7 +9,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-STATUS, HOLD, RESUME, RESET, JOG_CANCEL = b"?", b"!", b"~", b"\x18", b"\x85"  # commands that pass every queue
+STATUS, HOLD, RESUME = b"?", b"!", b"~"  # these commands and the next two pass every queue
+RESET, JOG_CANCEL = b"\x18", b"\x85"
 PLAIN_FEED = b"\x90"  # feeds as the lines say them, no override
 LETTERS = "XYZABC"
 RX_BUFFER = 128  # [bytes] of GRBL on an Uno; one stays free

@@ -94,7 +94,8 @@ class Modes:
 
     def read(self, line: str) -> Words | int:
         """A line's words, or the number of its error."""
-        codes, values, spindle, index = list[float](), dict[str, float](), None, 0
+        codes, values = list[float](), dict[str, float]()
+        spindle, index = None, 0
         while index < len(line):
             letter, match = line[index], _NUMBER.match(line, index + 1)
             if not "A" <= letter <= "Z":

@@ -92,7 +92,8 @@ class SimBoard:
 
     def _power_up(self, cause: int, net: list[int], retained: _RetainedState | None) -> None:
         self._splitter = protocol.Splitter(self.board.frame)
-        self._error, self._detail, self._next, self._nonce = Error.NO_SESSION, 0, 0, -1
+        self._error, self._detail = Error.NO_SESSION, 0
+        self._next, self._nonce = 0, -1
         self._digest = 0
         self._cause, self._boots, self._silent = cause, self._boots + 1, 0.0
         self.setup.reset()
@@ -163,7 +164,8 @@ class SimBoard:
             self._end_session(Error.VERSION)
         elif nonce != self._nonce:
             self._end_session(Error.HELD)
-            self._error, self._detail, self._next, self._nonce = Error.OK, 0, 0, nonce
+            self._error, self._detail = Error.OK, 0
+            self._next, self._nonce = 0, nonce
             self._digest = nonce & 0xFFFF
             self._splitter.bad = 0
         b = self.board

@@ -68,7 +68,8 @@ class _Session:
     """A robot file on its board, opened again whenever it was corrected."""
 
     def __init__(self, robot: str, path: str, scene: str | None, link: board_link.Link) -> None:
-        self.path, self.scene, self.link, self.port = path, scene, link, link.port
+        self.path, self.scene = path, scene
+        self.link, self.port = link, link.port
         arguments.load_arm(robot, scene)  # what is wrong with the files is told first
         self.text = _read_text(path)
         self.assumptions_told = False

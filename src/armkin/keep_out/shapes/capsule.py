@@ -65,5 +65,6 @@ def tube(begin: Array, end: Array, radius: float) -> Array:
     for centre, heights in ((begin, np.linspace(-np.pi / 2, 0, 5)), (end, np.linspace(0, np.pi / 2, 5))):
         rings += [centre + radius * (np.cos(h) * circle + np.sin(h) * z) for h in heights]
     grid = np.array(rings)
-    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    a, b = grid[:-1, :-1], grid[1:, :-1]
+    c, d = grid[1:, 1:], grid[:-1, 1:]
     return np.concatenate([np.stack(triangle, axis=2).reshape(-1, 3, 3) for triangle in ((a, b, c), (a, c, d))])

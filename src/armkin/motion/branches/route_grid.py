@@ -255,7 +255,8 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
 
 def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:
     (start, end), (d0, d1), h = path.ends(path.q, intervals), path.ends(path.d, intervals), path.h[intervals]
-    d0, d1, chord, largest = d0 * h, d1 * h, end - start, np.zeros(len(intervals))
+    d0, d1 = d0 * h, d1 * h
+    chord, largest = end - start, np.zeros(len(intervals))
     for f in (0.25, 0.75):
         q = start + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
         targets = route.targets(path.s[intervals] + f * h)

@@ -102,7 +102,8 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Trajecto
         return None
     from armkin.keep_out.body_pairs import guard
 
-    bodies, allowed, nearest, postures = guard(full_arm), None, None, 0
+    bodies, postures = guard(full_arm), 0
+    allowed, nearest = None, None
     escaping: tuple[int, ...] = ()
     for first, way in _geometries(trajectory):
         full_way = _UnlockedWay(arm, way)

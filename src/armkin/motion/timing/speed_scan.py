@@ -58,7 +58,8 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
     """Affine functions (k, M) on 0 <= y <= top (M,), pruned."""
     i = np.arange(len(top))
     first, last = b.argmin(axis=0), (a * top + b).argmin(axis=0)
-    a0, b0, a1, b1 = a[first, i], b[first, i], a[last, i], b[last, i]
+    a0, b0 = a[first, i], b[first, i]
+    a1, b1 = a[last, i], b[last, i]
     y = np.minimum(np.maximum((b1 - b0) / (a0 - a1), 0.0), top)
     two = ((first != last) & (y >= 0.0)).nonzero()[0]
     a, b, y = a.take(two, axis=1), b.take(two, axis=1), y[two]
@@ -115,7 +116,8 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
 
 def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
     """Follow runs from places (r,), each up to where y is what comes there; write those that no other one passes."""
-    k, current, run, end = heads, y[heads], np.arange(len(heads)), len(y) - 1
+    k, current = heads, y[heads]
+    run, end = np.arange(len(heads)), len(y) - 1
     ends = np.full(len(heads), end)
     steps: list[tuple[Int, Int, Array]] = []
     while len(k):

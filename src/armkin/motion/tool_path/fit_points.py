@@ -197,7 +197,8 @@ def _round_corners(
     low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
     x, y = np.maximum(begin, low[curve]), np.minimum(end, high[curve])
     keep = y - x > 1e-12
-    x, y, begin, end, powers = x[keep], y[keep], begin[keep], end[keep], powers[keep]
+    x, y = x[keep], y[keep]
+    begin, end, powers = begin[keep], end[keep], powers[keep]
     cut = _cubic_parts(powers, (x - begin) / (end - begin), (y - begin) / (end - begin))
     blends = np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
     round_ = ~stop[corner]

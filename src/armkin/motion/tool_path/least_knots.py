@@ -55,7 +55,8 @@ class Rows:
         order = np.lexsort((u, chords.curve[numbers]))
         apart = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
         order = order[apart]
-        u, numbers, share, heavy = u[order], numbers[order], share[order], heavy[order]
+        u, numbers = u[order], numbers[order]
+        share, heavy = share[order], heavy[order]
         is_point = (share == 0) | (share == 1)
         _, curve = np.unique(chords.curve[numbers], return_inverse=True)
         edge = np.append(True, curve[1:] != curve[:-1])

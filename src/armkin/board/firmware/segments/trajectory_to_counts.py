@@ -87,8 +87,8 @@ class Cut(StartedTrajectory):
 
     def _move_of(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
         if self._is_line(stretch, start, end):
-            a, b, clock, least = start.tolist(), end.tolist(), self.clock, self.min_interval
-            return line_segments(a, b, stretch.law, clock=clock, min_interval=least, pieces=pieces)
+            a, b, least = start.tolist(), end.tolist(), self.min_interval
+            return line_segments(a, b, stretch.law, clock=self.clock, min_interval=least, pieces=pieces)
         arm = self.trajectory.arm
         parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
         cycles = round(stretch.duration * self.clock)

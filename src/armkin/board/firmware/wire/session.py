@@ -62,7 +62,8 @@ class Session:
 
         Raises LinkError if nothing answers, or something else than this protocol.
         """
-        begin, heard, nonce, leave = self.port.now(), bytearray(), _new_nonce(), [_LISTENS, _AGAIN]
+        begin, nonce = self.port.now(), _new_nonce()
+        heard, leave = bytearray(), [_LISTENS, _AGAIN]
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
