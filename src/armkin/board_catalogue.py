@@ -15,9 +15,9 @@ from importlib.metadata import EntryPoint, entry_points
 from pkgutil import iter_modules
 from typing import Any, NamedTuple
 
-GROUP = "armkin.boards"
-_KINDS = "armkin.board.kinds"  # above this room: found by name, as other packages are
-_FIRMWARE = "firmware"  # the module of all of BOARDS
+GROUP = "armkin.boards"  # name of the entry points that other packages' boards stand in
+_KINDS = "armkin.board.kinds"  # package of the kinds, above this room: found by name, as other packages are
+_FIRMWARE = "firmware"  # module of all of BOARDS
 
 
 class Board(NamedTuple):

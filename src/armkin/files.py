@@ -16,8 +16,8 @@ _APPEND = {"w": "a", "wb": "ab"}
 
 
 _ROBOT = rb"(?m)^convention[ \t]*:", rb"(?m)^joints[ \t]*:"
-_DATA = (".csv", ".jsonl", ".npz", ".parquet")  # before another ending it is not clear which one is meant
-_HEAD = 2_000_000  # [bytes] of a file that are looked at: robot files are shorter
+_DATA = (".csv", ".jsonl", ".npz", ".parquet")  # table endings: before another one it is not clear which is meant
+_HEAD = 2_000_000  # size [bytes] of a file's beginning that is looked at: robot files are shorter
 _kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
 

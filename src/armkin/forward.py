@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 Motion = Entry | tuple[Entry, Entry]  # a joint's value; of one that turns also cosine and sine of its actual angle
-FEW = 16  # poses that plain Python does sooner than arrays
+FEW = 16  # poses up to which plain Python is faster than arrays
 
 
 def fk(arm: Arm, q: ArrayLike) -> Poses:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 Pulses = NDArray[np.int64]
 
-_LARGEST = 2.0**53  # beyond it a double no longer counts whole pulses
-_HALF = 1e-9  # pulses: closer than this to a half is a half, as degrees have no exact radians
+_LARGEST = 2.0**53  # number of pulses beyond which a double no longer counts whole ones
+_HALF = 1e-9  # distance [pulses] from a half that is a half, as degrees have no exact radians
 _CANDIDATES = 4096  # pulse vectors that `best_pulses` tries for one pose
 _AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
 

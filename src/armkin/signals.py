@@ -15,9 +15,9 @@ TYPE_CHECKING = False  # as in the package: this is imported before signals are 
 if TYPE_CHECKING:
     from types import FrameType
 
-_AGAIN_S = 0.01
+_AGAIN_S = 0.01  # time [s] between two looks
 _waiting: set[int] = set()  # signals that come again
-_NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # one module goes by its first two names
+_NOT_IN = ("_frozen_importlib", "importlib._bootstrap", "pydantic.")  # no exception may be raised in these
 
 
 def handle_interrupt(number: int, frame: FrameType | None) -> None:

@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-SHARE = 0.1  # of a joint's max_speed, for all that moves here
-STEP = 2.0  # [deg | mm] that a joint may leave its place while its direction is looked at
-_FIRST = 5.0  # [deg | mm] that each joint leaves home in the first move
-_LONGEST = 60.0  # [s] of one jog
-_VISIBLE = 1.0  # [mm] that the tool must move to tell a direction by it
+SHARE = 0.1  # share of a joint's max_speed for all that moves here
+STEP = 2.0  # way [deg | mm] that a joint may leave its place while its direction is looked at
+_FIRST = 5.0  # way [deg | mm] that each joint leaves home in the first move
+_LONGEST = 60.0  # length [s], at most, of one jog
+_VISIBLE = 1.0  # way [mm] that the tool must move to tell a direction by it
 
 
 class Operator(Protocol):
@@ -157,7 +157,7 @@ def jog_by_keys(board: Board, person: Operator, *, narrower: bool = False) -> di
     return limits_set
 
 
-_KEYS = "123456789abc"  # of up to twelve joints
+_KEYS = "123456789abc"  # keys of up to twelve joints
 
 
 def _narrow_limit(

@@ -27,7 +27,7 @@ from armkin.errors import ArmkinError, LinkError
 from armkin.formula.arrays import Array
 from armkin.motors import joints
 
-PATIENCE = 120.0  # [s] that a motion may take longer than planned, whatever happens
+PATIENCE = 120.0  # time [s] that a motion may take longer than planned, whatever happens
 _numbers = itertools.count()
 
 

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 STATED = 20  # rows from which on standard deviations are stated: of 8 to 10 rows half lay within one, not 68 %
-HOPELESS = 0.25  # of the points' spread: an error that large on unseen rows is no calibration
+HOPELESS = 0.25  # share of the points' spread: an error that large on unseen rows is no calibration
 
 # Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
 _PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 KINDS = ("base", "tool", "zeros", "ratios", "lengths", "twists")
-NEARLY_PARALLEL = 0.05  # [rad] below, the common normal is too far away to hang corrections on
+NEARLY_PARALLEL = 0.05  # angle [rad] below which the common normal is too far away to hang corrections on
 
 # The workshop prior: what a built arm differs from its table by (standard deviations). A base is put up by hand, and a
 # measuring tip is what its owner screwed on.

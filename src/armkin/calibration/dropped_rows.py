@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 
 K = 4.0  # residuals beyond K scales lose three quarters of their weight
-MEDIAN = 1.5382  # of the length of three standard normal numbers
-FINEST = 0.005, 1e-5  # [mm, rad] no scale is smaller: what a measurement's last digit is worth
-DROPPED = 0.1  # a row of less weight is called wrong
+MEDIAN = 1.5382  # median of the length of three standard normal numbers
+FINEST = 0.005, 1e-5  # smallest scale [mm, rad]: what a measurement's last digit is worth
+DROPPED = 0.1  # weight below which a row is called wrong
 
 
 def weights(r: Array | None, scale: float) -> Array:

@@ -18,11 +18,11 @@ from armkin.model.units import radian_or_reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LEAST_ROWS = 4
-STILL = math.radians(0.1), 0.1  # [rad, mm] a joint that moves less does not move
-ON_A_LINE = 0.01  # of the rows' length, how thick a cloud on a line is at most
-FITS = 0.1  # of the rows' spread, a miss that needs no explanation
-EXPLAINS = 0.35  # of the miss as given, what another reading must leave to be the explanation
+LEAST_ROWS = 4  # rows of a measurement, at least
+STILL = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint does not move
+ON_A_LINE = 0.01  # thickness of a cloud on a line, at most, as a share of the rows' length
+FITS = 0.1  # miss, as a share of the rows' spread, that needs no explanation
+EXPLAINS = 0.35  # share of the miss as given that another reading must leave to be the explanation
 
 
 def check_measurements(arm: Arm, data_rows: Measurements) -> None:

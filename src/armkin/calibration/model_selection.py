@@ -21,14 +21,14 @@ from armkin.calibration.robust_fit import Fit, Measurements, fit_corrections, re
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
-FOLDS = 5
-GAIN = 0.97  # the first level above the file is taken if it leaves at most this share of the squared error
-CERTAIN = 0.5  # [standard errors] that the first level must gain besides; later levels: 0
-FEW = 18.0  # every level must gain FEW / rows standard errors more than that
-MANY = 10  # [rows] with fewer a fit can look good by chance: OPEN holds for it, too
-CLEAR = 0.7  # with fewer than MANY rows: the share of the file's error on unseen rows that base and tool may leave
-OPEN = 0.5  # share of the file's error: what the covariance of a fit to few rows may leave open at the tip
-CAP = 4.0  # errors above this many medians count as this many: one wrong row does not decide
+FOLDS = 5  # parts of the rows, each of which is left out once
+GAIN = 0.97  # share of the squared error, at most, that the first level above the file must leave to be taken
+CERTAIN = 0.5  # gain [standard errors] that the first level must have besides; later levels: 0
+FEW = 18.0  # gain [standard errors] times the number of rows that every level must have on top
+MANY = 10  # rows below which a fit can look good by chance: OPEN holds for it, too
+CLEAR = 0.7  # share of the file's error on unseen rows that base and tool may leave with fewer than MANY rows
+OPEN = 0.5  # share of the file's error that the covariance of a fit to few rows may leave open at the tip
+CAP = 4.0  # error [medians] that larger ones count as: one wrong row does not decide
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 UNSEEN = 0.7  # share of the prior's doubt: a correction of which more is left is not shown by the rows
-TOGETHER = 0.9  # correlation of two corrections of which only the sum is seen
-CANDIDATES = 400
-UNLIMITED = np.pi, 200.0  # [rad, mm] how far an unlimited joint is moved for a suggestion
+TOGETHER = 0.9  # correlation of two corrections from which on only their sum is seen
+CANDIDATES = 400  # postures among which the next ones to measure are chosen
+UNLIMITED = np.pi, 200.0  # way [rad, mm] that an unlimited joint is moved for a suggestion
 
 
 def doubts(model: Model, fit: Fit) -> Array:

@@ -15,7 +15,7 @@ from armkin.calibration.corrected_chain import Model
 from armkin.calibration.dropped_rows import loss, scales, weights
 from armkin.formula.arrays import Array
 
-STEPS = 40
+STEPS = 40  # steps, at most, of a fit
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from armkin.cli.commands import COMMANDS
 from armkin.cli.negative_numbers import options_first
 from armkin.signals import put_off
 
-_INTERRUPTED = 130
+_INTERRUPTED = 130  # exit code after Ctrl-C
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 

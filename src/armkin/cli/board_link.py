@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_FASTEST = 4_000_000  # what USB adapters make; a bus has 1,000,000
+_FASTEST = 4_000_000  # rate [bit/s], at most, that USB adapters make; a bus has 1,000,000
 
 
 def _baud_rate(text: str | None) -> int | None:
@@ -60,9 +60,9 @@ Assume = Annotated[
         autocompletion=completion.poses,
     ),
 ]
-BAUD = 250_000
-_LONGEST_NOTE = 10_000  # bytes
-SIM = "sim"
+BAUD = 250_000  # rate [bit/s] of the firmware's port
+_LONGEST_NOTE = 10_000  # size [bytes], at most, of a note
+SIM = "sim"  # name of a port to a board in this process
 AT_HOME = "the simulated board starts with the arm in its home pose, and forgets all at the end"
 
 

@@ -22,8 +22,8 @@ from armkin.errors import FileError, UsageError
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
 
-WORTH = 2_000  # rows for which pyarrow is worth its import
-LONGEST = 100_000  # characters of a line: what is longer is no CSV file
+WORTH = 2_000  # rows from which on pyarrow is worth its import
+LONGEST = 100_000  # characters of a line, at most: what is longer is no CSV file
 SIZE = 1 << 18  # characters read at once
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")

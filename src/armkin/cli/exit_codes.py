@@ -13,7 +13,7 @@ from armkin import errors
 from armkin.cli import output
 from armkin.cli.commands import COMMANDS
 
-RUNTIME = 1  # of a batch: `cli.batch_answers.Tally`
+RUNTIME = 1  # exit codes; those of a batch: `cli.batch_answers.Tally`
 USAGE = 2
 NO_SOLUTION = 3
 ROBOT_FILE = 4

@@ -11,7 +11,7 @@ NOT_FINITE = ("nan", "inf", "infinity")
 
 _PI = r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
-_LONGEST = 10_000  # characters of a number
+_LONGEST = 10_000  # characters of a number, at most
 
 
 def number(text: str, name: str, largest: float = LARGEST) -> float:

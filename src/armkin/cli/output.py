@@ -10,7 +10,7 @@ from typing import Any, Protocol, TextIO
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
-_LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
+_LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line at most; an error may quote a long word
 TEXT = (".txt", ".json")  # endings of an answer in a file
 _broken: list[str] = []  # words of the command line that have line breaks in them
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far

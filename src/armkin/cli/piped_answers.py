@@ -13,7 +13,7 @@ from armkin.errors import FileError, NoSolutionError, UsageError
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_LARGEST = 32_000_000  # [bytes] of standard input: some 50,000 answers
+_LARGEST = 32_000_000  # size [bytes], at most, of standard input: some 50,000 answers
 _TOOL = ("xyz", "rpy")
 _NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
 

@@ -7,7 +7,7 @@ import sys
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn
 
-_WIDTH = 10  # of the bar: with counts in millions the time left, at the end, still fits 80 columns
+_WIDTH = 10  # characters of the bar: with counts in millions the time left, at the end, still fits 80 columns
 
 
 class Bar:

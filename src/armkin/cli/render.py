@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_TERMINAL = 80  # columns
+_TERMINAL = 80  # columns of a terminal that does not tell its own
 
 
 def head(arm: Arm) -> Head:

@@ -97,8 +97,8 @@ def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
     return _checked_goals(arm, [number for number, _ in numbered], [values for _, values in numbered])
 
 
-_NEIGHBOURS = 2.5  # pulses beside the exact value that `pulses --best` may choose
-_MOST_PULSES = 2**53
+_NEIGHBOURS = 2.5  # distance [pulses] from the exact value within which `pulses --best` may choose
+_MOST_PULSES = 2**53  # pulses of a goal, at most
 
 
 @dataclass

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from armkin.cli import output
 from armkin.errors import UsageError
 
-_BEGINS = 0.8  # [s] after which a held key is sent again at the latest, on every system's default
-_AGAIN = 0.25  # [s] in which the next one comes then
-_POLL = 0.01  # [s] that one look takes
+_BEGINS = 0.8  # time [s] after which a held key is sent again at the latest, on every system's default
+_AGAIN = 0.25  # time [s] between two repeats of a held key, at most
+_POLL = 0.01  # time [s] that one look takes
 _ARROWS = {"[C": "+", "[A": "+", "[D": "-", "[B": "-", "OC": "+", "OA": "+", "OD": "-", "OB": "-"}
 _ARROWS_WINDOWS = {"M": "+", "H": "+", "K": "-", "P": "-"}
 

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import RobotFile
 
-_METRES = 2.0  # mm: a target this near to the base, or an arm this short, was meant in metres
-_RADIANS = 3.2  # deg: a little more than pi
-_BIG = 50.0  # mm: the reach of an arm whose file is certainly in mm
+_METRES = 2.0  # distance [mm]: a target this near to the base, or an arm this short, was meant in metres
+_RADIANS = 3.2  # angle [deg]: a little more than pi
+_BIG = 50.0  # reach [mm] of an arm whose file is certainly in mm
 _TURNS = (math.pi / 2, math.pi)
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armkin.columns.csv_cells import csv_cell
 from armkin.columns.table import Column, Table, Words, row_count, take_rows
 
-WORTH = 2_000  # rows for which pyarrow is worth its import
+WORTH = 2_000  # rows from which on pyarrow is worth its import
 BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
 
 

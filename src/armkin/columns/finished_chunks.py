@@ -19,8 +19,8 @@ from typing import IO, Any
 
 from armkin.errors import FileError, UnfinishedError, UsageError
 
-HANDED_ON = 2.0  # [s] until the processes of a run that was killed have ended, too
-_ASIDE = ".writing"  # ends the name of what is not whole yet
+HANDED_ON = 2.0  # time [s] until the processes of a run that was killed have ended, too
+_ASIDE = ".writing"  # ending of the name of what is not whole yet
 
 
 class Parts:

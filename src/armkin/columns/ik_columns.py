@@ -25,7 +25,7 @@ from armkin.model.lock_joints import unlock
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
 
-BLOCK = 2_048  # targets of which all arrays fit the cache
+BLOCK = 2_048  # targets worked on at once: all their arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
 

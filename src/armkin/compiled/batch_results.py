@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions
 
-ROOM = 24  # columns that a large result has room for from the start: to grow it would take its memory twice
-MOVABLE = 32_000_000  # [bytes] results up to this grow by a copy instead: allocators reuse the memory given back
+ROOM = 24  # columns that a large result has room for from the start: to enlarge it would take its memory twice
+MOVABLE = 32_000_000  # size [bytes] up to which a result is enlarged by a copy: allocators reuse the memory given back
 BLOCK = 4096  # rows moved at once
 
 

@@ -17,7 +17,7 @@ from armkin.keep_out.clearance import Clearance, clearance, least_clearances, na
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-WORTH = 8192  # poses of a closed form that are worth a thread
+WORTH = 8192  # poses of a closed form from which on a thread pays
 
 
 class JointFunctions:

@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import EQUAL
 
 SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
-MOST = 7  # joints that numpy adds up from left to right
+MOST = 7  # joints, at most, that numpy adds up from left to right
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:

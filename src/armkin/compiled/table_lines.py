@@ -15,7 +15,7 @@ from armkin.columns.table import Column, Table, Words, row_count, take_rows
 from armkin.compiled import toolchain
 
 SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
-LEAST, MOST = -292, 324  # powers of ten that doubles need
+LEAST, MOST = -292, 324  # powers of ten, least and greatest, that doubles need
 WIDEST = 25  # characters of a number: -2.2250738585072014e-308
 SPARE = 64  # characters behind the last one that C may write
 BLOCK = 4_096  # rows printed at once: their text stays in the cache

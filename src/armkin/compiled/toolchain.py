@@ -30,8 +30,8 @@ from armkin.errors import FileError, MissingExtraError
 # set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
 FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
-_DAY = 86_400.0  # [s]
-LONGEST = 60.0  # [s] that optimising may take; three_dof takes 2, an arm by elimination 8
+_DAY = 86_400.0  # day [s]
+LONGEST = 60.0  # time [s] that optimising may take; three_dof takes 2, an arm by elimination 8
 
 
 def announce() -> None:

@@ -22,9 +22,9 @@ from armkin.errors import ArmkinError, ClusterError, MissingExtraError
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
-REACHED = 1.5  # [s] until an address is given up to which no connection comes about
-SECONDS = 10  # until a scheduler is given up that has taken the connection and does not answer, or has no worker
-AHEAD = 3  # chunks a thread of the workers
+REACHED = 1.5  # time [s] until an address is given up to which no connection comes about
+SECONDS = 10  # time [s] until a scheduler is given up that took the connection but does not answer, or has no worker
+AHEAD = 3  # chunks sent ahead to each thread of the workers
 
 
 def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:

@@ -21,8 +21,8 @@ from armkin.errors import ClusterError
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
-AHEAD = 2  # chunks a process that wait for it, or for those before them
-PATIENCE = 3  # times that the process of the same chunk may end
+AHEAD = 2  # chunks for each process that wait for it, or for those before them
+PATIENCE = 3  # times that the process of one chunk may end before the run ends
 
 _job: tuple[Callable[[Any, Any], Any], Any] | None = None
 

@@ -24,9 +24,9 @@ from armkin.robot_file.robot_file_text import format_robot_file, pose_keys, tidy
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-COORDINATES = 1e-9  # [mm] how exactly a table must give the arm's poses
-PARALLEL = 1e-13  # [rad] axes this close have no common normal of their own
-LEAST = 1e-11  # [mm] a distance below is rounding
+COORDINATES = 1e-9  # error [mm], at most, of the arm's poses by a table
+PARALLEL = 1e-13  # angle [rad] of axes that have no common normal of their own
+LEAST = 1e-11  # distance [mm] below which it is rounding
 
 _GEOMETRY = ("convention", "base", "tool", "zero_pose", "joints")
 

@@ -22,9 +22,9 @@ from armkin.view.skeleton import arm_shape
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-METRE = 1000.0  # [mm]
-THICK = 0.035  # a link's radius, of the reach
-SHORTEST = 1e-6  # [mm] a shorter piece is not drawn
+METRE = 1000.0  # metre [mm]
+THICK = 0.035  # radius of a link, as a share of the reach
+SHORTEST = 1e-6  # length [mm] below which a piece is not drawn
 
 _COLOURS = (("body", "0.85 0.85 0.85 1"), ("joint", "0.25 0.35 0.5 1"))
 

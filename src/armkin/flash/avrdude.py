@@ -12,8 +12,8 @@ from pathlib import Path
 from armkin.errors import LinkError
 
 _PROGRAMMERS = {"atmega328p": "arduino", "atmega2560": "wiring"}
-_BAR = 50  # marks of a bar of its
-_LONGEST = 120.0  # [s]; an Uno takes 7
+_BAR = 50  # marks of avrdude's progress bar
+_LONGEST = 120.0  # time [s] that an upload may take; an Uno takes 7
 
 
 def find_avrdude() -> str | None:

@@ -16,8 +16,8 @@ from pathlib import Path
 from armkin.errors import LinkError
 
 _INFO = "INFO_UF2.TXT"
-_CHIP = "RPI-RP2"  # in its line Board-ID, and the drive's name
-_APPEARS = 20.0  # [s] that a system may take to mount it
+_CHIP = "RPI-RP2"  # name of the chip in the drive's line Board-ID, and of the drive
+_APPEARS = 20.0  # time [s] that a system may take to mount the drive
 
 
 def is_boot_drive(folder: Path) -> bool:

@@ -10,8 +10,8 @@ from armkin.board_catalogue import BOARDS
 from armkin.errors import MissingExtraError
 
 FOLDER = Path(__file__).parent / "images"
-SUMS = "SHA256SUMS"  # as sha256sum writes and checks it
-ENDINGS = {"rp2040": "uf2"}  # chip -> of its images; others: hex
+SUMS = "SHA256SUMS"  # name of the file of sums, as sha256sum writes and checks it
+ENDINGS = {"rp2040": "uf2"}  # endings of a chip's images; other chips': hex
 
 
 class Image(NamedTuple):

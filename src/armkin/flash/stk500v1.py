@@ -10,7 +10,7 @@ from armkin.errors import LinkError
 _SYNC, _LEAVE, _SIGNATURE = 0x30, 0x51, 0x75
 _ADDRESS, _WRITE, _READ = 0x55, 0x64, 0x74
 _END, _IN_SYNC, _OK = 0x20, 0x14, 0x10
-_ANSWER = 1.0  # [s]; a page takes 5 ms to be written
+_ANSWER = 1.0  # time [s] that an answer may take; a page takes 5 ms to be written
 
 
 class Stk500v1:

@@ -14,7 +14,7 @@ _SIGN_ON, _ENTER, _LEAVE = 0x01, 0x10, 0x11
 _ADDRESS, _WRITE, _READ = 0x06, 0x13, 0x14
 _SIGNATURE = 0x1B
 _BEYOND_64K = 1 << 31
-_ANSWER = 1.0  # [s]
+_ANSWER = 1.0  # time [s] that an answer may take
 
 
 class Stk500v2:

@@ -24,10 +24,10 @@ _SIGNATURES = {
     bytes.fromhex("1e9516"): "atmega328p",  # and the PB
     bytes.fromhex("1e9801"): "atmega2560",
 }
-_LISTENS = 1.6  # [s] after a reset that a boot loader is asked for
-_CALLS = 3  # resets after which one that answers and then says no more is given up
-_TO_BOOT_DRIVE = 1200  # baud: opening its port so sends a Pico to its boot drive
-_RESTART = 10.0  # [s] that a Pico may take to show its serial port again
+_LISTENS = 1.6  # time [s] after a reset in which a boot loader is asked for
+_CALLS = 3  # resets after which a boot loader that answers and then says no more is given up
+_TO_BOOT_DRIVE = 1200  # rate [bit/s]: opening its port so sends a Pico to its boot drive
+_RESTART = 10.0  # time [s] that a Pico may take to show its serial port again
 
 Loader = Stk500v1 | Stk500v2
 Tick = Callable[[int, int], None]

@@ -41,7 +41,7 @@ _C = {
     "maximum": "{1} > {0} ? {1} : {0}",
     "minimum": "{1} < {0} ? {1} : {0}",
 }
-SMALLEST = 1e-30  # constants of a formula that stand for "next to nothing", in single precision
+SMALLEST = 1e-30  # constant of a formula that stands for "next to nothing" in single precision
 
 
 _COMPARISONS = {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==="}

@@ -41,7 +41,7 @@ _PYTHON = {
     "where": "{1} if {0} else {2}",
 }
 _FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "atan2", "copysign")}
-DEEPEST = 20  # brackets within brackets that a line may have: Python's parser takes 200
+DEEPEST = 20  # brackets within brackets, at most, that a line may have: Python's parser takes 200
 
 Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
 Step = tuple[Value, str, list[Value | str]]  # a value: the operation that it is the result of, and on what

@@ -21,7 +21,7 @@ ODD = {"arctan2", "rint", "tan", "cbrt"}  # functions whose sign is that of thei
 COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
 
 
-FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # the same values, of the other branch
+FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # names of operations that give the same values of the other branch
 
 
 def index_before_flip(op: str, index: tuple[int, ...], axes: tuple[int, ...]) -> tuple[int, ...]:

@@ -16,10 +16,10 @@ from armkin.formula.arrays import Array
 if TYPE_CHECKING:
     from armkin.formula import numpy_code
 
-SMALL = 256  # poses: buffers of batches up to this are kept, as making them costs more than filling them
-UNCOPIED = 512  # elements of numpy's buffers: it copies operands that are repeated on a branch axis if two rows fit
-CACHE = 4_000_000  # [bytes] that buffers take: 4 to 6 MB cost the same with 1 MB a core, 9 MB more
-LENGTHS = 16  # of batches, for which a thread keeps buffers
+SMALL = 256  # poses of a batch up to which its buffers are kept: to make them costs more than to fill them
+UNCOPIED = 512  # elements of numpy's buffers: it copies operands repeated on a branch axis if two rows fit
+CACHE = 4_000_000  # size [bytes] of all buffers: 4 to 6 MB cost the same with 1 MB a core, 9 MB more
+LENGTHS = 16  # lengths of batches for which a thread keeps buffers
 
 
 class StraightLineCode:

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 
     _Segment = tuple[int, Array, Array, bool]  # its body, where it begins and ends, whether it slides out
 
-BASE = "base"
-ASSUMED = 0.02  # of the reach: the radius of a body that the file does not state
+BASE = "base"  # name of the base's body
+ASSUMED = 0.02  # radius, as a share of the reach, of a body that the file does not state
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 2048  # postures at once: few calls of numpy, and what they need stays in the cache
-POSTURES = 256  # in which a pair that always overlaps is looked for, home among them
+POSTURES = 256  # postures in which a pair that always overlaps is looked for, home among them
 _PRIMES = (2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37)
 
 

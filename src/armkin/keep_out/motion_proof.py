@@ -24,12 +24,12 @@ if TYPE_CHECKING:
     from armkin.keep_out.body_pairs import Guard
     from armkin.keep_out.motion_geometry import Way
 
-STEP = 0.01  # [mm] of motion that is not looked into any further
-_FIRST = 16  # intervals to begin with
+STEP = 0.01  # motion [mm] that is not looked into any further
+_FIRST = 16  # intervals that a proof begins with
 _AT_ONCE = 1024  # intervals that are halved together, the earliest ones: a hit is found before all is looked into
-_LEAST = 1e-9  # of a cell: no interval is halved below this
-_STRIDES = (64, 8, 1)  # samples that are looked at first, and in between
-_ROUGH = (0.5, 0.05)  # [mm], share of the least clearance: how far the bound may be below what was seen
+_LEAST = 1e-9  # share of a cell below which no interval is halved
+_STRIDES = (64, 8, 1)  # strides of the samples that are looked at first, and in between
+_ROUGH = (0.5, 0.05)  # gap [mm], and share of the least clearance, by which the bound may be below what was seen
 
 
 @dataclass(frozen=True)

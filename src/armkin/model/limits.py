@@ -14,7 +14,7 @@ from armkin.model.units import DEGREE, finite_or_none, limits_out
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SLACK = 1e-9  # [rad | mm] a joint this far outside still counts as on its limit
+SLACK = 1e-9  # distance [rad | mm] outside at which a joint still counts as on its limit
 
 
 def outside_limits(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:

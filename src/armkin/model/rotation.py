@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from armkin.formula.arrays import Array
 
 # Turns z and y over: conjugating a joint's motion with it reverses the joint.
-BLOCK = 2_048  # rows of which all arrays fit the cache
+BLOCK = 2_048  # rows worked on at once: all their arrays fit the cache
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 

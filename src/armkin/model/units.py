@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-DEGREE = math.pi / 180
+DEGREE = math.pi / 180  # degree [rad]
 
 JointUnits = Annotated[list[str], "unit of each joint value: deg or mm"]
 

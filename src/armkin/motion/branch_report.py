@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.branches.branch_path import CarriedRoute
     from armkin.motion.timing.trajectory import Trajectory
 
-_SAME = 1e-6  # [rad | mm] of two postures that are one
+_SAME = 1e-6  # distance [rad | mm] of two postures that are one
 _WHY = {
     "end": "carries all",
     "reach": "the path leaves the reach",

@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-TOP = 250.0  # [mm/s] of the tool at 100 %: the most that ISO 10218-1 allows while somebody guides an arm by hand
-TURNING = np.deg2rad(60.0)  # [rad/s] likewise
-LONGEST = 10.0  # [s] of a line
-STEP = 2.0  # [mm] between postures that are looked at, or as many hundredths of a radian
-SLOWEST = 0.1  # of TOP: where joints at their full speed carry the tool slower than this, a singularity is near
+TOP = 250.0  # speed [mm/s] of the tool at 100 %: ISO 10218-1 allows no more while somebody guides an arm by hand
+TURNING = np.deg2rad(60.0)  # speed [rad/s] at which the tool turns at 100 %
+LONGEST = 10.0  # time [s], at most, of a line
+STEP = 2.0  # distance [mm], or hundredths of a radian, between postures that are looked at
+SLOWEST = 0.1  # share of TOP: where joints at full speed carry the tool slower than this, a singularity is near
 Frame = Literal["base", "tool"]
 
 

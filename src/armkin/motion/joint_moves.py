@@ -20,7 +20,7 @@ from armkin.motors import motor_accel, pulses, undriven_joints
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LEAST_SHARE = 1e-4  # of a joint's max_speed or max_accel
+LEAST_SHARE = 1e-4  # least share of a joint's max_speed or max_accel
 
 
 def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
-TOLERANCE = 0.05  # [mm]
-HOLD = 1.5  # of max_accel, on a hold
+TOLERANCE = 0.05  # distance [mm] that the tool may be off its path
+HOLD = 1.5  # factor on max_accel during a hold
 
 
 @dataclass(frozen=True)

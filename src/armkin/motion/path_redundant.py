@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import Move, PathFile
 
-VALUES = 72  # of the redundant joint that are asked, over its range
-STEP = 0.02  # of the arm's reach, between targets that are asked
-ASKED = 200  # targets of a way, at most
-AWAY = 0.01  # of the arm's reach, that values had best keep from what must not be touched
-POSTURES = 8_000  # targets that are asked for that, at most
-MOST = 6  # values that are planned for
-SAME = 1e-9  # [rad] values of joint moves that are one
+VALUES = 72  # values of the redundant joint, over its range, that are asked
+STEP = 0.02  # distance, as a share of the arm's reach, between targets that are asked
+ASKED = 200  # targets of a way, at most, that are asked
+AWAY = 0.01  # distance, as a share of the arm's reach, that values had best keep from what must not be touched
+POSTURES = 8_000  # targets, at most, that are asked for that distance
+MOST = 6  # values, at most, that are planned for
+SAME = 1e-9  # difference [rad] of values of joint moves that are one
 
 
 def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathRequest) -> PathPlan:

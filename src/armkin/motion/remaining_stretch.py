@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Stretch
 
-_STEP = 0.002  # [s] of the plan's time between grid points
-_SHORT = 0.05  # [s] of the plan's time: what is left of it is slow, and as good as straight
+_STEP = 0.002  # step [s] of the plan's time between grid points
+_SHORT = 0.05  # length [s] of the plan's time below which what is left is slow, and as good as straight
 
 
 def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stretch:

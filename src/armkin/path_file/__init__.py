@@ -27,7 +27,7 @@ from armkin.robot_file import catalogue, strict_yaml
 if TYPE_CHECKING:
     from armkin.path_file.drawing import DrawingOptions, Placing
 
-LARGEST = 32_000_000  # [bytes]
+LARGEST = 32_000_000  # size [bytes], at most, of a path file
 _KIND = strict_yaml.Kind(
     "path file", "moves", "moves: and a list; rows of CSV belong into a .csv file", 4 * 1024 * 1024, 100_000
 )

@@ -15,7 +15,7 @@ from armkin.path_file.gcode_words import PLAIN, Words, line_error, lines, words_
 from armkin.path_file.path_keys import MOST_POINTS, PathFile
 
 AXES = "XYZ"
-INCH = 25.4
+INCH = 25.4  # inch [mm]
 _UNITS = {20.0: INCH, 21.0: 1.0}  # [mm]
 _MOTION = {0.0: "G0", 1.0: "G1", 2.0: "G2", 3.0: "G3"}
 _PLANES = {17.0: (0, 1, 2), 18.0: (2, 0, 1), 19.0: (1, 2, 0)}  # two axes of the plane, and the one across
@@ -35,7 +35,7 @@ _PLACES = frozenset("XYZIJKR")
 _ZERO: Point = (0.0, 0.0, 0.0)
 _NO_AXES = [None] * 3
 _KNOWN_G = {*_GROUP, *_IGNORED_G, 53.0}
-_PAUSES, _ENDS = (0.0, 1.0), (2.0, 30.0)  # M codes
+_PAUSES, _ENDS = (0.0, 1.0), (2.0, 30.0)  # M codes that pause or end a program
 
 
 def parse_gcode(raw: bytes, name: str, placing: Placing, options: DrawingOptions) -> PathFile:

@@ -7,7 +7,7 @@ import math
 from armkin.path_file.drawing import Point
 
 AXES = "XYZ"
-_OFF = (0.005, 0.001, 0.5)  # [mm], of the radius, [mm]: how far an arc's end may lie off its circle
+_OFF = (0.005, 0.001, 0.5)  # distances [mm], of the radius, [mm]: how far an arc's end may lie off its circle
 
 
 class ArcError(ValueError):

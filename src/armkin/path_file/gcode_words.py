@@ -11,10 +11,10 @@ _COMMENT = re.compile(r"\([^()]*\)")
 _WORD = re.compile(r"([A-Z])([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))")
 _CHECKSUM = re.compile(r"\*\s*([0-9]{1,3})\s*$")
 _OWN_WORDS = re.compile(r"\s*(?:N\s*[0-9]+\s*)?(?:M\s*0*([0-9]+)|T\s*([0-9]+))")
-_MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # of RS-274: the other words of the line stay words
+_MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # M codes of RS-274: the other words of the line stay words
 _HOME = re.compile(r"\s*(?:N\s*[0-9]+\s*)?G\s*0*28(?![0-9.])")
-_FLAG = re.compile(r"[A-Z](?!\s*[-+.0-9])")  # of G28: slicers name axes, and what is left out, without a number
-_LONGEST = 1000  # characters of a line that is not a comment alone
+_FLAG = re.compile(r"[A-Z](?!\s*[-+.0-9])")  # flag of G28: slicers name axes, and what is left out, without a number
+_LONGEST = 1000  # characters, at most, of a line that is not a comment alone
 _PLACE = r"([+-]?(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15}))"
 _FEED = r"(?:F([0-9]{1,15}(?:\.[0-9]{0,15})?) ?)?"
 # most lines of slicers and of CAM programs: G0 or G1 (or neither), F, X, Y, Z, E, F

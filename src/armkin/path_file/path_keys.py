@@ -10,14 +10,14 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-LARGEST = 1e7  # of a number
+LARGEST = 1e7  # size of a number, at most
 Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
-MOST_POINTS = 120_000  # of a polyline or a spline, and of a CSV file
-LEAST_PERCENT = 0.01
-LEAST_TOOL_SPEED = 1e-3  # [mm/s]
-LEAST_TOLERANCE = 1e-6  # [mm]
+MOST_POINTS = 120_000  # points of a polyline or a spline, and of a CSV file, at most
+LEAST_PERCENT = 0.01  # share [%] of a speed, at least
+LEAST_TOOL_SPEED = 1e-3  # speed [mm/s] of the tool, at least
+LEAST_TOLERANCE = 1e-6  # tolerance [mm], at least
 Percent = Annotated[float, Field(ge=LEAST_PERCENT, le=100)]
 Speed = Annotated[float, Field(ge=LEAST_TOOL_SPEED, le=1e6)]
 Joints = Values | dict[str, Number] | str

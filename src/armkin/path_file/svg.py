@@ -22,11 +22,11 @@ from armkin.path_file.svg_shapes import (
     parse_transform,
 )
 
-_MM = 25.4 / 96  # of a px
+_MM = 25.4 / 96  # pixel [mm]
 _GROUPS = {"svg", "g", "a", "symbol"}
 _REFUSED = {"text", "tspan", "textPath", "image", "foreignObject", "switch"}
-_DEEPEST, _MOST = 64, 200_000  # elements in each other, and in all
-_SAME = 1e-9
+_DEEPEST, _MOST = 64, 200_000  # elements in each other, and in all, at most
+_SAME = 1e-9  # distance [px] of points that are one
 
 
 @dataclass

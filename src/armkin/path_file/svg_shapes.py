@@ -8,13 +8,13 @@ from collections.abc import Callable, Mapping
 
 Point = tuple[float, float]
 Matrix = tuple[float, float, float, float, float, float]  # x' = a x + c y + e, y' = b x + d y + f
-CLOSE = 0.002  # [mm] of a chord to its curve
-_TURN = math.radians(8.0)  # of a curve from chord to chord, at most
-_MOST = 20_000  # chords of one curve
+CLOSE = 0.002  # distance [mm] of a chord from its curve
+_TURN = math.radians(8.0)  # turn [rad] of a curve from chord to chord, at most
+_MOST = 20_000  # chords of one curve, at most
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GAP = re.compile(r"[ \t\r\n]*,?[ \t\r\n]*")
-_LARGEST = 1e9  # of a number
-_NO_RADIUS = 1e-9  # an arc with less is a line
+_LARGEST = 1e9  # size of a number, at most
+_NO_RADIUS = 1e-9  # radius below which an arc is a line
 _COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "pt": 4 / 3, "pc": 16.0, "q": 96 / 101.6}
 _TRANSFORM = re.compile(r"\s*,?\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")

@@ -16,16 +16,16 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.motion.plan.path_plan import PathPlan
 
-_SAMPLES = 600  # of what is drawn over time
-_MOST = 160_000  # times at which speeds and accelerations are looked at
-_MANY = 20_000  # points of the tool's way: more are thinned out
-_FINE = 1 / 1500  # of what is seen: a smaller box is one point
-_SMALL = 1 / 3  # of what is seen: a smaller way is drawn once more, large
-_WIDE = 84  # characters of a line above the arm
-_INKED, _WIDTHS = 150.0, (0.1, 0.6)  # [pt] of a line as long as what is seen is wide, to ink about half of it; lines
+_SAMPLES = 600  # samples of what is drawn over time
+_MOST = 160_000  # times, at most, at which speeds and accelerations are looked at
+_MANY = 20_000  # points of the tool's way beyond which they are thinned out
+_FINE = 1 / 1500  # size of a box, as a share of what is seen, that is one point
+_SMALL = 1 / 3  # size of a way, as a share of what is seen, below which it is drawn once more, large
+_WIDE = 84  # characters, at most, of a line above the arm
+_INKED, _WIDTHS = 150.0, (0.1, 0.6)  # width [pt] of a line as long as what is seen is wide, half of it ink; widths [pt]
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
-_SINGULAR = "#c0392b"
-_STRAIGHT = "#fbe9e7"  # behind what is drawn over time, where the wrist passes a singularity
+_SINGULAR = "#c0392b"  # colour of a singularity
+_STRAIGHT = "#fbe9e7"  # colour behind what is drawn over time, where the wrist passes a singularity
 _INK = "#333333"
 
 

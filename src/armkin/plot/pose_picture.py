@@ -24,13 +24,13 @@ if TYPE_CHECKING:
     from armkin.keep_out.clearance import Hit
     from armkin.model.arm import Arm
 
-MOST = 20_000  # poses of one path
-_DRAWN = 40  # of them, evenly spaced, that are drawn as arms
+MOST = 20_000  # poses, at most, of one path
+_DRAWN = 40  # poses of a path, evenly spaced, that are drawn as arms
 _BETWEEN = 16  # points of the tip's way from one pose to the next
-_ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # of the eye [deg]
+_ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # directions [deg] of the eye
 _WIDE = 40  # characters of a line that tells what is hit: the legend leaves the arm its room
-_HIT, _SOLID = "#d62728", "#7a6a58"  # of an arm that hits something, of what it must not touch
-_AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # x, y, z of a frame
+_HIT, _SOLID = "#d62728", "#7a6a58"  # colours of an arm that hits something and of what it must not touch
+_AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # colours of a frame's x, y and z
 
 
 def plot_poses(

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 COLOURS = ("manipulability", "step_error", "reach", "z")
 KEEP = 150_000  # samples of a survey that are enough for a picture: more cannot be told apart
-_CLOUD = 20_000  # of them drawn in space
+_CLOUD = 20_000  # samples of a survey that are drawn in space
 _EACH = 15  # samples a spot of a projection should have in the mean; below that they are drawn one by one
 
 _LABELS = {

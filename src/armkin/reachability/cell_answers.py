@@ -31,7 +31,7 @@ from armkin.reachability.reach_cells import STRAIGHT, Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-TURN = 2 * math.pi
+TURN = 2 * math.pi  # whole turn [rad]
 MEASURES = ("manipulability", "limit_margin", "step_error_mm")
 Words = NDArray[np.uint64]
 

@@ -16,7 +16,7 @@ from armkin.reachability.volume import tip_freedoms
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_MOST_MOTORS = 14  # 8,192 combinations of signs a pose
+_MOST_MOTORS = 14  # motors, at most, of an arm: 8,192 combinations of signs a pose
 MEASURES = ("manipulability", "step_error")
 
 

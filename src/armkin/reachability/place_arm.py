@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.keep_out_keys import Entry
 
-INSIDE = 1e-6  # [mm] of a base that stands on an obstacle, by rounding
+INSIDE = 1e-6  # depth [mm] to which a base stands in an obstacle by rounding
 
 
 class Obstacles(NamedTuple):

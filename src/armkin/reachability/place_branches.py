@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.inverse.answers.solutions import Solutions
     from armkin.model.arm import Arm
 
-FARTHEST = 0.5 * math.pi  # [rad] that a joint turns from one target to the next
+FARTHEST = 0.5 * math.pi  # turn [rad], at most, of a joint from one target to the next
 
 
 def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:

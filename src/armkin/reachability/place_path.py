@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
-STEP = 0.01  # of the arm's reach, from target to target along a path
+STEP = 0.01  # distance, as a share of the arm's reach, from target to target along a path
 
 
 @dataclass(frozen=True)

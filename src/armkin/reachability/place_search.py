@@ -53,8 +53,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
-MOST = 10**7  # places
-SOLVES, ANSWERS = 40_000, 10**7  # of a chunk: where each is solved, and where most are read off
+MOST = 10**7  # places, at most, of a search
+SOLVES, ANSWERS = 40_000, 10**7  # solves of a chunk where each place is solved; places of one where most are read off
 Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
 FEW, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 

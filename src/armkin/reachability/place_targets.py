@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targets and a task
 
 TURNING = ("xy_theta", "xyz_yaw")  # tasks of which an angle turns with the arm
-BLOCK = 8_192  # targets that are asked together: what is known of them stays in the cache
-BEYOND = 1e-6  # reaches: farther away nothing solves a target
+BLOCK = 8_192  # targets asked together: what is known of them stays in the cache
+BEYOND = 1e-6  # distance [reaches] beyond the reach from which on nothing solves a target
 
 
 class HeldArm(NamedTuple):

@@ -22,9 +22,9 @@ from armkin.reachability.cell_answers import TURN, whole_turn
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-RADII = 256  # from joint 1's axis to the reach
+RADII = 256  # radii from joint 1's axis to the reach
 AT_ONCE = 16  # targets whose radii are solved together: they stay in the cache
-ROUNDING = 1e-6  # [rad, mm, reaches]: what is nearer to a limit, or to being there, is asked
+ROUNDING = 1e-6  # distance [rad, mm, reaches] from a limit, or from being there, below which a place is asked
 
 
 class Radii(NamedTuple):

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-MOST = 10**9  # cells
-MOST_ORIENTATIONS = 10**6  # of a cell
-GOLDEN = math.pi * (3.0 - math.sqrt(5.0))
-STRAIGHT = 1e-9  # axes nearer than this are parallel
+MOST = 10**9  # cells of a map, at most
+MOST_ORIENTATIONS = 10**6  # orientations of a cell, at most
+GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # golden angle [rad]
+STRAIGHT = 1e-9  # sine between axes that are parallel
 
 
 @dataclass(frozen=True, eq=False)

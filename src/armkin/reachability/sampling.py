@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 1 << 16  # samples in memory at once
-MOST = 10**10  # about an hour on a desktop computer
+MOST = 10**10  # samples of a survey, at most: about an hour on a desktop computer
 
 
 def sampled_range(arm: Arm) -> tuple[Array, Array]:

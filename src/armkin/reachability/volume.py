@@ -40,14 +40,14 @@ if TYPE_CHECKING:
 
 _SIDE = 512  # cells along each side of the section of an arm in space
 _LINE = 1 << 14  # cells of a planar arm's section, which is a line
-_STRETCHES = 64  # at most, along the sweep
-_UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples grown from them
-_CHUNK = 1 << 16
-_LEAST_CHUNK = 1 << 11
-_ALL = 5_000  # samples of a survey from which its volume is worth the whole effort
-_POOL = 1 << 14  # poses to grow from
-_OVERSHOOT = 0.04  # of the range: samples beyond a limit are set on it
-_MARGIN = 0.02  # of the section's size, around what a first look finds
+_STRETCHES = 64  # stretches along the sweep, at most
+_UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples that vary them
+_CHUNK = 1 << 16  # samples of a chunk
+_LEAST_CHUNK = 1 << 11  # samples of a chunk, at least
+_ALL = 5_000  # samples of a survey from which on its volume is worth the whole effort
+_POOL = 1 << 14  # poses that are varied
+_OVERSHOOT = 0.04  # share of the range: samples beyond a limit are set on it
+_MARGIN = 0.02  # share of the section's size around what a first look finds
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.reachability.reach_cells import Grid
 
-TURN = 2 * np.pi
+TURN = 2 * np.pi  # whole turn [rad]
 
 
 class Layer(NamedTuple):

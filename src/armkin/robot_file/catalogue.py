@@ -11,7 +11,7 @@ from pathlib import Path
 
 from armkin.errors import FileError
 
-_HERE = Path(__file__).resolve().parents[1]  # the package
+_HERE = Path(__file__).resolve().parents[1]  # folder of the package
 _FOLDERS = (_HERE / "robots", _HERE.parents[1] / "robots")
 _SUFFIXES = (".yaml", ".yml")
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Board, Drive, Gripper, Joint, Motor, RobotKeys, Screw
 
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
-_LEAST_WEIGHT = 1e-6  # of a joint on a motor: less would divide by nothing
+_LEAST_WEIGHT = 1e-6  # weight, at least, of a joint on a motor: less would divide by nothing
 # A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
 _ROUNDING = 1e-3
 

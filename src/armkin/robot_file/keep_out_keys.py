@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from armkin.robot_file.key_types import Angle, Length, Model
 
-MOST = 256  # entries of a file: each is held against every body
+MOST = 256  # entries of a file, at most: each is held against every body
 SELF = "self"
 
 Path = tuple[str | int, ...]

@@ -16,7 +16,7 @@ from armkin import board_catalogue
 from armkin.robot_file.key_types import Angle, Length, Model
 
 MAX_JOINTS = 12
-MAX_MOTORS = 24  # two on each joint
+MAX_MOTORS = 24  # motors, at most: two on each joint
 MAX_POSES = 100
 
 Triple = tuple[float, float, float]

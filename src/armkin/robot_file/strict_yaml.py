@@ -23,9 +23,9 @@ from typing import Any
 import yaml
 
 MAX_BYTES = 256 * 1024
-MAX_VALUES = 2_000  # an arm of twelve joints with all its motors has 500
+MAX_VALUES = 2_000  # values of a file, at most: an arm of twelve joints with all its motors has 500
 MAX_DEPTH = 12
-MAX_DIGITS = 15  # an integer of 15 digits is still exact as a float
+MAX_DIGITS = 15  # digits of an integer, at most: one of 15 is still exact as a float
 
 Path = tuple[str | int, ...]
 

@@ -28,12 +28,12 @@ from armkin.robot_file.robot_file_text import pose_keys, tidy
 from armkin.robot_file.urdf_document import Joint, Tree, is_xacro, parse_document
 
 MAX_BYTES = 8 * 2**20
-SNAP = 1e-4  # [rad] an angle this close to a right angle counts as one, with `snap`
-METRE = 1000.0  # [mm]
-FARTHEST = 1e4  # [m] of anything from the base
-LARGE = 20.0  # [m] from base to tip that makes one ask
-TURNS = 25.0  # [rad] of a limit that make one ask: four turns
-ENDLESS = 1e6  # [deg | mm] of a limit that is none
+SNAP = 1e-4  # angle [rad] from a right angle that counts as one, with `snap`
+METRE = 1000.0  # metre [mm]
+FARTHEST = 1e4  # distance [m], at most, of anything from the base
+LARGE = 20.0  # distance [m] from base to tip that makes one ask
+TURNS = 25.0  # limit [rad] that makes one ask: four turns
+ENDLESS = 1e6  # limit [deg | mm] that is none
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _ROUND = ("cylinder", "sphere", "capsule")  # collision shapes with a radius

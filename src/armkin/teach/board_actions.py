@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from armkin.teach.board_thread import BoardThread, Job
     from armkin.teach.tabs import Action, Fields, Tab
 
-DEAD_MAN = 0.3  # [s] a jog goes on after the page was last heard of
-FOLLOW_SPEED = 0.15  # of every joint's max_speed
-FOLLOW_HOP = 5.0  # [deg | 2 mm] of the joint that moves farthest: where the arm stops and looks for its goal again
-_LONGEST_JOG = 60.0  # [s]
+DEAD_MAN = 0.3  # time [s] that a jog goes on after the page was last heard of
+FOLLOW_SPEED = 0.15  # share of every joint's max_speed
+FOLLOW_HOP = 5.0  # way [deg | 2 mm] of the fastest joint after which the arm stops and looks for its goal again
+_LONGEST_JOG = 60.0  # length [s], at most, of a jog
 
 
 class BoardActions:

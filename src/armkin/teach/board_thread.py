@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 Job = Callable[[Backend], None]
 
-_POLL = 0.25  # [s] between two looks at a board that stands
-_TELL = 0.08  # [s] between two positions of an arm that moves: what a page can draw
+_POLL = 0.25  # time [s] between two looks at a board that stands
+_TELL = 0.08  # time [s] between two positions of an arm that moves: what a page can draw
 
 
 class BoardThread:

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from armkin.errors import MissingExtraError, UsageError
 from armkin.formula.arrays import Array
 
-MAX_BYTES = 64 * 2**20  # of one file
+MAX_BYTES = 64 * 2**20  # size [bytes], at most, of one file
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-_DEEPEST = 40  # nodes within nodes
+_DEEPEST = 40  # nodes within nodes, at most
 _Index = NDArray[np.int64]
 
 

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-SHOWN = 0.2  # [mm] that the tip shown may be off where it is looked at, so that it is less than 0.5 in between
-MOST = 160_000  # samples of some 80 bytes; a plan that needs more is shown less exactly, and the page says so
+SHOWN = 0.2  # distance [mm] that the tip shown may be off where it is looked at, for less than 0.5 in between
+MOST = 160_000  # samples, at most, of some 80 bytes; a plan that needs more is shown less exactly, and the page says so
 
 
 def playback_json(arm: Arm, plan: PathPlan) -> dict[str, Any]:

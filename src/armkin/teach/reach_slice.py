@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 ACROSS = 12  # voxels from joint 1's axis to the end of the reach
-DIRECTIONS = 12  # of the tool's z axis, in each voxel
-VALUES = 12  # of the redundant joint over its range, where the others have a closed form; else it stays at home
+DIRECTIONS = 12  # directions of the tool's z axis in each voxel
+VALUES = 12  # values of the redundant joint over its range where the others have a closed form; else it stays at home
 
 
 @lru_cache(maxsize=4)

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
-MOST = 2000  # moves
-_UNDO = 100
+MOST = 2000  # moves of a program, at most
+_UNDO = 100  # steps that can be undone
 _DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
 _SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
 _NAMED = re.compile(r"^\s*- .*?#\s*(?P<name>.+?)\s*$")

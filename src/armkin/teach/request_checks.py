@@ -10,7 +10,7 @@ from typing import Any
 from armkin.errors import UsageError
 from armkin.teach.page_key import RefusedError
 
-LARGEST = 256 * 1024  # bytes of a body: a path file of ten thousand moves
+LARGEST = 256 * 1024  # size [bytes], at most, of a body: a path file of ten thousand moves
 
 
 def body_length(headers: Mapping[str, str]) -> int:

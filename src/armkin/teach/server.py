@@ -25,9 +25,9 @@ from armkin.teach.page_key import KEY, TAB, Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-_STRANGERS = 100  # connections that have not shown the key; beyond, the oldest one is closed
-_LOOK = 0.1  # [s] between two looks at whether a page is still there
-_SILENT = 15.0  # [s] after which an event stream says something, so that dead lines are noticed
+_STRANGERS = 100  # connections that have not shown the key, at most; beyond, the oldest one is closed
+_LOOK = 0.1  # time [s] between two looks at whether a page is still there
+_SILENT = 15.0  # time [s] after which an event stream says something, so that dead lines are noticed
 
 
 class Server(ThreadingHTTPServer):

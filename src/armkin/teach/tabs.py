@@ -10,8 +10,8 @@ from typing import Any
 
 from armkin.teach.page_key import RefusedError
 
-MOST = 4  # a browser has six connections to a server: each page keeps one, and STOP must find one free
-_FORGET = 20.0  # [s] until a page that has never listened is forgotten
+MOST = 4  # pages at once, at most: a browser keeps six connections to a server, and STOP must find one free
+_FORGET = 20.0  # time [s] until a page that has never listened is forgotten
 
 
 class Tab:

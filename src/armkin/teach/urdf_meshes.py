@@ -18,11 +18,11 @@ from armkin.teach.mesh_files import read_triangles
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MOST = 18_000  # triangles of an arm: 0.43 MB of a page
-_FILES = 200
-_GRID = 1000  # the finest grid on which corners stand is the reach by so many
-_COARSER = 1.25  # each next grid by so much, until no more triangles are left
-_APART = 0.1, 1e-3  # [mm], [rad] by which axes of the URDF and of the arm may differ
+MOST = 18_000  # triangles, at most, of an arm: 0.43 MB of a page
+_FILES = 200  # mesh files, at most, of an arm
+_GRID = 1000  # divisor of the reach that gives the finest grid on which corners stand
+_COARSER = 1.25  # factor from a grid to the next one, until no more triangles are left
+_APART = 0.1, 1e-3  # difference [mm], [rad], at most, between axes of the URDF and of the arm
 
 
 def meshes_json(arm: Arm, path: str) -> dict[str, Any]:

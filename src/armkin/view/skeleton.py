@@ -19,7 +19,7 @@ from armkin.model.rotation import rotation_about
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_ALIKE = 0.05  # sine of the angle between two axes, below which their common normal says little
+_ALIKE = 0.05  # sine of the angle between two axes below which their common normal says little
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _STEPPER = {"full_steps": 200, "microsteps": 16}
-_GEAR = 20.0  # of a turning joint: 0.006 degrees a step
-_LEAD = 8.0  # mm a turn of a sliding one
-_RATES = {"max_speed": (30.0, 50.0), "max_accel": (60.0, 100.0)}  # deg, mm
+_GEAR = 20.0  # gear ratio of a turning joint: 0.006 degrees a step
+_LEAD = 8.0  # lead [mm a turn] of a sliding joint
+_RATES = {"max_speed": (30.0, 50.0), "max_accel": (60.0, 100.0)}  # rates of a turning and of a sliding joint [deg, mm]
 
 
 def arm_with_assumptions(arm: Arm) -> tuple[Arm, list[str]]:

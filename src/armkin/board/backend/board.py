@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Gripper
 
 Never = Callable[[], bool]
-JOG_PIECE = 0.3  # [s] of one piece of a jog on a board that cannot be told to go on
+JOG_PIECE = 0.3  # length [s] of one piece of a jog on a board that cannot be told to go on
 
 CAPABILITIES = {
     "home": "find the limit switches",

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Board, Drive
 
 Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
-_DRIVER = "A4988"  # in lines to add
+_DRIVER = "A4988"  # driver named in lines to add
 
 
 def missing_by_command(arm: Arm) -> dict[str, list[str]]:

@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-_TURN = 2 * np.pi  # [rad] outside its limits at which a revolute joint's position is not believed
-_SAMPLES = 256  # of a curve that begins outside the limits
+_TURN = 2 * np.pi  # way [rad] outside its limits at which a revolute joint's position is not believed
+_SAMPLES = 256  # samples of a curve that begins outside the limits
 
 
 class StartError(RuntimeError):

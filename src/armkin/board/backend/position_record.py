@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 Marks = Mapping[str, Sequence[float] | str]  # what a board keeps, by name, as it says it
-_MOST = 64_000_000  # [bytes] of a record, and of its plan
-_STEP = 1.0 + 1e-9  # [counts] that every motor of an arm on its plan is within; no count lies just there
+_MOST = 64_000_000  # size [bytes], at most, of a record, and of its plan
+_STEP = 1.0 + 1e-9  # distance [counts] from a plan within which every motor on it is; no count lies just there
 
 
 @dataclass(frozen=True)

@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-PERIOD = 0.02  # [s] between positions
-LATE = 0.05  # [s] that one goes on at most: a program that had no time for longer does not cut across its path
-WATCH = 0.1  # [s] between readings of position and errors in motion
-LAG = 400  # [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
-SETTLED = 12  # [counts] from the goal, 1 degree, at which a move has arrived
-STRAY = 2 * SETTLED  # [counts] that a motion may begin from where the servos stand: they sag a little under load
-SETTLING = 1.0  # [s] that it may take
+PERIOD = 0.02  # time [s] between two positions sent
+LATE = 0.05  # time [s] that one position goes on at most: a program that was late does not cut across its path
+WATCH = 0.1  # time [s] between readings of position and errors in motion
+LAG = 400  # distance [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
+SETTLED = 12  # distance [counts] from the goal, 1 degree, at which a move has arrived
+STRAY = 2 * SETTLED  # distance [counts] of a motion's start from where the servos stand: they sag a little under load
+SETTLING = 1.0  # time [s] that a move may take to arrive after its end
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:

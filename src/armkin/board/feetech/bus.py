@@ -13,9 +13,9 @@ from armkin.errors import LinkError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
 
-BAUD = 1_000_000
-_ANSWER = 0.02  # [s] a servo may take; USB adapters hold bytes back for up to 16 ms
-_TRIES = 8  # of a question before a servo counts as gone
+BAUD = 1_000_000  # rate [bit/s] of the bus
+_ANSWER = 0.02  # time [s] that a servo's answer may take; USB adapters hold bytes back for up to 16 ms
+_TRIES = 8  # times that a question is asked before a servo counts as gone
 
 
 class Bus:

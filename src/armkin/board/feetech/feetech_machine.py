@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
 __all__ = ["LAG", "SETTLED", "ServoMachine", "job", "servo_ids"]
 
-_ENDLESS = 1 << 30  # [counts] of a servo without limits
-EAGER = 1.5  # times the trajectory's speed that a servo may make to keep up
+_ENDLESS = 1 << 30  # position [counts] that bounds a servo without limits
+EAGER = 1.5  # factor on the trajectory's speed that a servo may move at to keep up
 
 
 class ServoMachine(ServoArm):

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_LONGEST = 1_000_000  # [bytes] of a calibration file
-_MIDDLE = 5.0  # [deg] that a joint's zero may be from the middle of its limits
+_LONGEST = 1_000_000  # size [bytes], at most, of a calibration file
+_MIDDLE = 5.0  # distance [deg], at most, of a joint's zero from the middle of its limits
 _WHOLE = {
     "id": (0, 253),
     "drive_mode": (0, 1),

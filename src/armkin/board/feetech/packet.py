@@ -13,7 +13,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 ALL = 0xFE  # id of a broadcast, which no servo answers but with a sync read
-LARGEST = 250  # bytes of a packet that a servo takes
+LARGEST = 250  # size [bytes] of the longest packet that a servo takes
 
 
 class Instruction(IntEnum):

@@ -33,24 +33,24 @@ class Register(NamedTuple):
 
 
 MODEL = Register(3, 2)
-LEAST = Register(9, 2)  # [counts] that the servo goes to, least and most; both 0: no limits, it turns on and on
-MOST = Register(11, 2)
-OFFSET = Register(31, 2, 11)  # [counts] taken off the encoder's position
+LEAST = Register(9, 2)  # least position [counts] that the servo goes to; least and most both 0: it turns without limits
+MOST = Register(11, 2)  # greatest position [counts] that the servo goes to
+OFFSET = Register(31, 2, 11)  # counts taken off the encoder's position
 TORQUE = Register(40, 1)
-ACCELERATION = Register(41, 1)  # [100 counts/s^2], 0: none
+ACCELERATION = Register(41, 1)  # acceleration [100 counts/s^2], 0: none
 GOAL_POSITION = Register(42, 2, 15)
 GOAL_TIME = Register(44, 2)
-GOAL_SPEED = Register(46, 2, 15)  # [counts/s], 0: as fast as it can
+GOAL_SPEED = Register(46, 2, 15)  # speed [counts/s], 0: as fast as it can
 POSITION = Register(56, 2, 15)
-SPEED = Register(58, 2, 15)  # [counts/s]
-LOAD = Register(60, 2, 10)  # [0.1 % of the greatest torque]
-VOLTAGE = Register(62, 1)  # [0.1 V]
-TEMPERATURE = Register(63, 1)  # [deg C]
+SPEED = Register(58, 2, 15)  # speed [counts/s]
+LOAD = Register(60, 2, 10)  # load [0.1 % of the greatest torque]
+VOLTAGE = Register(62, 1)  # supply [0.1 V]
+TEMPERATURE = Register(63, 1)  # temperature [deg C]
 MOVING = Register(66, 1)
 
-LIMITS = (LEAST.address, 4)  # least and most: read together
-GOAL = (ACCELERATION.address, 7)  # acceleration, position, time, speed: written together
-STATE = (POSITION.address, 8)  # position, speed, load, voltage, temperature: read together
+LIMITS = (LEAST.address, 4)  # registers of the least and the greatest position: read together
+GOAL = (ACCELERATION.address, 7)  # registers of acceleration, position, time and speed: written together
+STATE = (POSITION.address, 8)  # registers of position, speed, load, voltage and temperature: read together
 
 ERRORS = {1: "voltage", 2: "angle sensor", 4: "overheating", 8: "overcurrent", 32: "overload"}
 

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from armkin.board.feetech.bus import Bus
     from armkin.robot_file.robot_keys import Gripper
 
-SPEED = 500.0  # [counts/s] of a gripper without max_speed, 44 deg/s
-ARRIVED = 12  # [counts] from the goal, 1 degree
-STANDING = 1.0  # [s] without a change of position after which the jaw holds something,
-THERE = 0.1  # [s] or, that close to the goal, has arrived
-PERIOD = 0.02  # [s] between readings
+SPEED = 500.0  # speed [counts/s] of a gripper without max_speed, 44 deg/s
+ARRIVED = 12  # distance [counts] from the goal, 1 degree, at which the jaw is at its goal
+STANDING = 1.0  # time [s] without a change of position after which the jaw holds something
+THERE = 0.1  # time [s] without a change of position after which a jaw at its goal has arrived
+PERIOD = 0.02  # time [s] between readings
 
 
 def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bool]) -> float:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Lay = Callable[[Trajectory, Counts], Cut]
 
-_BEGINNING, _STOOD = 0.7, 1.0  # [s] of a motion, in which it goes on by itself if the arm stood no longer than this
+_BEGINNING, _STOOD = 0.7, 1.0  # lengths [s] of a motion's beginning and of a stand in it that ends by itself
 
 
 class _UnderWay:

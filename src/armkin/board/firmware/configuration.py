@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import Gripper
 
-_FAR = 2**30  # counts: an axis without a limit
-_SLACK = 1.05  # of a motor's rate: cycles, rates of 15 bits and parabolas make the end of a ramp that much faster
-_SERVO_RANGE = (400, 2600)  # [us] that the boards can make
+_FAR = 2**30  # limit [counts] of an axis without one
+_SLACK = 1.05  # factor on a motor's rate: cycles, rates of 15 bits and parabolas make a ramp's end that much faster
+_SERVO_RANGE = (400, 2600)  # pulse lengths [us] that the boards can make
 
 
 @dataclass(frozen=True)

@@ -28,9 +28,9 @@ if TYPE_CHECKING:
     from armkin.board.firmware.wire.protocol import Status
     from armkin.model.arm import Arm
 
-_SLOW = 26  # /256: the second approach runs at a tenth
-_MOST = 2**30  # of counts and counts/s
-_MARGIN = 1.25  # of the joint's range: how far a switch may be
+_SLOW = 26  # speed of the second approach, in 1/256 of the first: a tenth
+_MOST = 2**30  # greatest number of counts and of counts/s in a command
+_MARGIN = 1.25  # distance of a switch, at most, in a joint's ranges
 
 
 @dataclass(frozen=True)

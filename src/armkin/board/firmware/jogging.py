@@ -20,9 +20,9 @@ from armkin.motion.plan.trajectory_proof import free_way
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-HANDLE = 0.25  # [s] that the board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
-_LONGEST = 60.0  # [s] of a jog that is looked at
-SLOW = 8  # a lost position: at most an eighth of max_speed
+HANDLE = 0.25  # time [s] that a board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
+_LONGEST = 60.0  # length [s], at most, of a jog that is looked at
+SLOW = 8  # divisor of max_speed for a lost position: at most an eighth
 
 
 def prepare_jog(machine: FirmwareMachine) -> None:

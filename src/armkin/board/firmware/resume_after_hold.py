@@ -24,9 +24,9 @@ from armkin.errors import HeldError, LinkError, NothingHeldError
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-_SURE = 1.0  # [s] that the noted time may be off: of places that near, the earliest is taken
-_NOTED = 0.5  # [s] between two notes while the arm moves
-_MOST = 65_536  # [bytes] of a note
+_SURE = 1.0  # error [s], at most, of the noted time: of places that near, the earliest is taken
+_NOTED = 0.5  # time [s] between two notes while the arm moves
+_MOST = 65_536  # size [bytes], at most, of a note
 
 
 @dataclass(frozen=True)

@@ -22,21 +22,21 @@ if TYPE_CHECKING:
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
 _LEAD, LEAD_MOST, LEAD_BAD = 0.0015, 0.6, 0.05
-_LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor, [s] at least: a busy computer's next turn is not known
-_TICK = 20_000  # [cycles] of that pause, at most
+_LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor and lead [s]: a busy computer's next turn is not known
+_TICK = 20_000  # length [cycles], at most, of a tick of that pause
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
-_MARGIN, _SPARE = 30, 0.002  # a queue is dry that holds less than 1 / 32 and 2 ms more than the time to a stop,
-_SLOW = 0.024  # [s] from where on that is
-_TWICE = 1 + 33 / 32  # [s] of motion that each second since rest wants in the queue
-_UNHEARD_MOST = 0.045  # [s] of a segment before the first step, in which the arm may wait for its queue: the board
-_INTERVAL = 50_000  # takes a jump of speed for the time of 50 ms; [cycles] of its intervals, at most
-_SEEN = 64  # segments of a beginning, whose way to the board is reckoned: both ramps of a short move
+_MARGIN, _SPARE = 30, 0.002  # share and time [s]: a queue is dry below 1 / 32 and 2 ms more than the time to a stop
+_SLOW = 0.024  # time to a stop [s] from which on a queue can be dry
+_TWICE = 1 + 33 / 32  # motion [s] that each second since rest wants in the queue
+_UNHEARD_MOST = 0.045  # length [s] of a segment before the first step, at most, in which the arm may wait for its queue
+_INTERVAL = 50_000  # interval [cycles] of a tick, at most
+_SEEN = 64  # segments of a beginning whose way to the board is reckoned: both ramps of a short move
 # Segments of a motion's first frames: a short one is there soon, those behind it last a while.
 _STARTING = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
-_FAR = 0.005  # [s] of the slowest answer, from where on the queue is too short to wait for credit in a short move
-_BUSY = 0.0003, 0.0005  # [s] that a board is busy with a frame, and with a segment of it,
-_BETWEEN = 2.2  # times that between ticks
-_ACK = 16  # [bytes] of an answer
+_FAR = 0.005  # time [s] of the slowest answer from which on the queue is too short to wait for credit in a short move
+_BUSY = 0.0003, 0.0005  # time [s] that a board is busy with a frame, and with a segment of it
+_BETWEEN = 2.2  # factor on these times between ticks
+_ACK = 16  # size [bytes] of an answer
 
 
 def stream_frames(session: Session, frames: Iterator[Batch | None], report_left: Callable[[float], None]) -> Status:

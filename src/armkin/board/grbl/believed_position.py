@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.model.arm import Arm
 
-MARK = 1000  # [units] in G92, and up to as much again at random: no other board has the same, 0 means a reset
+MARK = 1000  # offset [units] in G92, and up to as much again at random: no other board has the same, 0 means a reset
 Kept = dict[str, list[float] | str]
 _LASTING = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
 

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
     from armkin.robot_file.robot_keys import Gripper
 
-_REST = 30.0  # [s] that a hold may take
-_FRESH = 5.0  # [s] after which the settings are read again: jogging prepares three times a second
+_REST = 30.0  # time [s] that a hold may take
+_FRESH = 5.0  # time [s] after which the settings are read again: jogging prepares three times a second
 
 
 class GrblMachine(StepperArm):

@@ -20,19 +20,19 @@ from armkin.errors import LinkError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
 
-BAUD = 115_200
-_BOOT = 4.0  # [s] a board may take to greet after its port was opened
-_ANSWER = 2.0  # [s] a line may take that moves nothing
-_POLL = 0.1  # [s] between status requests in motion
-_SILENCE = 2.0  # [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
-_HELD = 15.0  # [s] the same while it holds: somebody may have pressed its button, or a byte was damaged into a hold
-_LATE = 0.05  # [s] that answers to another program's lines may come behind
-_NONSENSE = ")&"  # no line, whatever it is the end of
+BAUD = 115_200  # rate [bit/s] of the port
+_BOOT = 4.0  # time [s] that a board may take to greet after its port was opened
+_ANSWER = 2.0  # time [s] that a line may take that moves nothing
+_POLL = 0.1  # time [s] between status requests in motion
+_SILENCE = 2.0  # time [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
+_HELD = 15.0  # time [s] without an answer while GRBL holds: its button was pressed, or a byte was damaged into a hold
+_LATE = 0.05  # time [s] that answers to another program's lines may come behind
+_NONSENSE = ")&"  # characters that are no line, whatever they are the end of
 _KEPT = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
-_READINGS = 13  # of an answer, until three in a row agree
+_READINGS = 13  # readings, at most, of an answer until three in a row agree
 _UNCLEAR = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
-_REPORT = 0.5  # [s] a status report may take
-_LONGEST = 4096  # [characters] without a line end: no GRBL speaks there
+_REPORT = 0.5  # time [s] that a status report may take
+_LONGEST = 4096  # characters, at most, without a line end: no GRBL speaks there
 
 
 T = TypeVar("T")

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.formula.arrays import Array
 
-BESIDE = 2.0  # [steps] of a motor beside the path: GRBL's own rounding, and that of its reports, is below 1
-AHEAD = 0.3  # [s] ahead of the plan: GRBL is never faster than it was told
-CREEP = 0.1, 3.0  # [s] of the plan that it takes more than so many seconds for
+BESIDE = 2.0  # distance [steps] of a motor from the path: GRBL's own rounding, and that of its reports, is below 1
+AHEAD = 0.3  # time [s] ahead of the plan, at most: GRBL is never faster than it was told
+CREEP = 0.1, 3.0  # part [s] of the plan, and time [s] that GRBL takes for it when it no longer moves
 _WINDOW = 250  # points of the path that are looked at, 10 s
 
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field
 
 STATUS, HOLD, RESUME = b"?", b"!", b"~"  # these commands and the next two pass every queue
 RESET, JOG_CANCEL = b"\x18", b"\x85"
-PLAIN_FEED = b"\x90"  # feeds as the lines say them, no override
+PLAIN_FEED = b"\x90"  # command: feeds as the lines say them, no override
 LETTERS = "XYZABC"
-RX_BUFFER = 128  # [bytes] of GRBL on an Uno; one stays free
+RX_BUFFER = 128  # size [bytes] of GRBL's buffer on an Uno; one stays free
 
 ALARMS = {
     1: "a limit switch closed in motion",

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.board.grbl.grbl_session import Session
     from armkin.robot_file.robot_keys import Gripper
 
-GRIPPING = 0.5  # [s] that a gripper without max_speed takes
+GRIPPING = 0.5  # time [s] that a gripper without max_speed takes
 
 
 class Spindle:

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.motion.timing.trajectory import Stretch, Trajectory
 
-PIECE = 0.04  # [s] of a curved stretch in one line: 25 lines a second
-HEAD = "G21G94"  # in every line: another program may have left, or set between two, inches or inverse time
-SLOWEST = 0.01  # [units/min] of a feed: GRBL refuses 0
+PIECE = 0.04  # length [s] of a curved stretch in one line: 25 lines a second
+HEAD = "G21G94"  # words in every line: another program may have left, or set between two, inches or inverse time
+SLOWEST = 0.01  # feed [units/min], at least: GRBL refuses 0
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:

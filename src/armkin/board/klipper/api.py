@@ -10,9 +10,9 @@ from armkin.errors import LinkError
 if TYPE_CHECKING:
     from armkin.board.ports import Port
 
-END = b"\x03"
-_ANSWER = 5.0  # [s] a question may take
-_LONGEST = 4_000_000  # [bytes] of one answer
+END = b"\x03"  # byte that ends a message
+_ANSWER = 5.0  # time [s] that a question may take
+_LONGEST = 4_000_000  # size [bytes], at most, of one answer
 
 
 class KlipperError(LinkError):

@@ -16,11 +16,11 @@ from armkin.board.backend.stepper_arm import steppers
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LETTERS = tuple("ABCDHIJKL")  # of the letters that Klipper leaves to extra axes: none that begins a G-code
-SOCKETS = "~/printer_data/comms/klippy.sock", "/tmp/klippy_uds"  # where Klipper's API server mostly is
-RATE = 10.0  # [units/s] of the virtual axis X that carries the time: see trajectory_to_g1_lines.py
-PIECE = 0.01  # [s] of one line
-MAX_ACCEL = 1000.0  # [units/s2] of X
+LETTERS = tuple("ABCDHIJKL")  # letters that Klipper leaves to extra axes and that begin no G-code
+SOCKETS = "~/printer_data/comms/klippy.sock", "/tmp/klippy_uds"  # paths where Klipper's API server mostly is
+RATE = 10.0  # speed [units/s] of the virtual axis X that carries the time: see trajectory_to_g1_lines.py
+PIECE = 0.01  # length [s] of one line
+MAX_ACCEL = 1000.0  # acceleration [units/s2] of X
 
 
 @dataclass(frozen=True)

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
 
 _CHUNK = 10  # lines in one request
-_PENDING = 8  # requests that may wait: Klipper answers when it has taken them
-_SPARE = 0.75  # [s] sent ahead besides what braking takes: Klipper drains its queue when it holds less than 0.25 s
-_FARTHEST = 1e9  # [units] of a place that can be
-_REST = 30.0  # [s] until what was sent must be done
+_PENDING = 8  # requests, at most, that wait: Klipper answers when it has taken them
+_SPARE = 0.75  # motion [s] sent ahead of what braking takes: Klipper drains its queue when it holds less than 0.25 s
+_FARTHEST = 1e9  # coordinate [units], at most, of a place that can be
+_REST = 30.0  # time [s] until what was sent must be done
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.motion.timing.trajectory import Trajectory
 
-HEAD = "G90\nM220 S100\nG92 X0"  # absolute values, no override of the speed, the time begins
-_ROWS = 256  # lines that are worked out at once
-_SHORT = 1e-4  # [s] of a piece that joins the next one: X has five decimals
+HEAD = "G90\nM220 S100\nG92 X0"  # words before a motion: absolute values, no override of the speed, the time begins
+_ROWS = 256  # lines worked out at once
+_SHORT = 1e-4  # length [s] below which a piece joins the next one: X has five decimals
 
 
 def line_count(trajectory: Trajectory) -> int:

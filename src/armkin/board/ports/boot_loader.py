@@ -10,7 +10,7 @@ from armkin.board.ports.logged_port import Traced
 from armkin.board.ports.port import Port
 from armkin.board.ports.serial_port import SerialPort
 
-_BAUD = 115200
+_BAUD = 115200  # rate [bit/s] of the boot loaders
 # STK500 version 2 (Atmel AVR068): start, number, size, token, CMD_LEAVE_PROGMODE_ISP, checksum
 _LEAVE = bytes([0x1B, 1, 0, 1, 0x0E, 0x11, 0x1B ^ 1 ^ 1 ^ 0x0E ^ 0x11])
 _HEAD = 4  # bytes after a start, the last the token: so many zeros end any message that has begun by chance

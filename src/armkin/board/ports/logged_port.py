@@ -6,7 +6,7 @@ import logging
 
 from armkin.board.ports.port import Port
 
-LOG = logging.getLogger("armkin.board")  # bytes at DEBUG, states at INFO
+LOG = logging.getLogger("armkin.board")  # logger of bytes at DEBUG and states at INFO
 
 
 class Traced:

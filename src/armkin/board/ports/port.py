@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
-BAUD = 250_000
-SIM = "sim"  # the name of a port to a board in this process
+BAUD = 250_000  # rate [bit/s] of the firmware's port
+SIM = "sim"  # name of a port to a board in this process
 
 
 class Port(Protocol):

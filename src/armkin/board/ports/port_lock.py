@@ -22,7 +22,7 @@ from armkin.user_folders import port_file_stem
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-_POLL_S = 0.05
+_POLL_S = 0.05  # time [s] between two looks at a port's lock
 _signals = os.name == "posix"  # elsewhere a signal of another process ends this one on the spot: a file asks instead
 
 

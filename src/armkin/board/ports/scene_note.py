@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from armkin.board.ports.port_lock import note_path
 
-_LONGEST = 4096  # bytes of a file's name
+_LONGEST = 4096  # length [bytes], at most, of a file's name
 
 
 def write_scene(port: str, scene: str) -> None:

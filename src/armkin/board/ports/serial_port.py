@@ -21,8 +21,8 @@ from armkin.board.ports.port import BAUD
 from armkin.board.ports.port_lock import Lock
 from armkin.errors import LinkError
 
-_READ = 0.005  # [s] a read waits at most
-_MOST = 4096  # bytes of one read: what never falls silent must not keep it from the clock and from a stop
+_READ = 0.005  # time [s] that a read waits at most
+_MOST = 4096  # size [bytes] of one read: what never falls silent must not keep it from the clock and from a stop
 
 
 class SerialPort:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armkin.board.sim.axis_counts import Axes, limit_rule_holds, row_value
 
-_TICK = 0.001  # [s]
+_TICK = 0.001  # length [s] of a tick
 
 
 class Cruise:

@@ -56,7 +56,7 @@ def axes_of(mask: int) -> list[int]:
     return [i for i in range(16) if mask >> i & 1]
 
 
-_FAR = 2**30
+_FAR = 2**30  # number [counts], at most, in a field
 
 
 def image_valid(image: Image, board: Board) -> bool:

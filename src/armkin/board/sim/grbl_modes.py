@@ -30,7 +30,7 @@ _GROUPS = (  # modal groups: one word of each in a line
 _OFFSETS = frozenset({10.0, 43.1, 92.0, 92.1})
 _USES_AXES = {10.0, 28.0, 43.1, 92.0}  # codes whose axis words are no move
 _KNOWN = set().union(_OTHER, *_GROUPS)
-INCH = 25.4
+INCH = 25.4  # inch [mm]
 
 
 @dataclass(frozen=True)

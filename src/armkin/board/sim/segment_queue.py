@@ -11,8 +11,8 @@ from itertools import accumulate
 from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
 from armkin.board.sim.axis_counts import Axes
 
-_TOO_FAST = 0.030  # [s] time to a stop from which an abrupt stop loses steps
-_SLOW = 0.024  # [s] the same, below which the arm may stand where its queue ends
+_TOO_FAST = 0.030  # time [s] to a stop from which an abrupt stop loses steps
+_SLOW = 0.024  # time [s] to a stop below which the arm may stand where its queue ends
 
 
 def intervals(s: Segment) -> Iterator[int]:

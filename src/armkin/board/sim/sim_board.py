@@ -19,7 +19,7 @@ from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.sim_motors import Motors
 from armkin.board_catalogue import Board
 
-_SILENCE = 0.5  # [s]
+_SILENCE = 0.5  # time [s] of silence after which the board holds
 
 
 @dataclass(frozen=True)

@@ -20,10 +20,10 @@ from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
 from armkin.board.sim.grbl_modes import Modes, Words
 
-BLOCKS = 15  # planner blocks
-_LINE = 80  # [bytes] of a line
+BLOCKS = 15  # blocks of the planner
+_LINE = 80  # length [bytes], at most, of a line
 _SEEN = 10  # reports between two that tell offset and overrides
-_FEED = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides; 0x90 takes them back
+_FEED = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides [%] by their byte; 0x90 takes them back
 _WHOLE = {1, 3, 10, 13, 20, 21, 22, 23, 32, 384}  # settings of whole numbers
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from armkin.board.firmware.wire.protocol import Error
 from armkin.board.sim.cruise import Cruise
 
-_DEBOUNCE = 0.004  # [s]
+_DEBOUNCE = 0.004  # time [s] that a switch must be closed
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from armkin.board.sim.cruise import Cruise
 
-_DEAD_MAN = 0.250  # [s]
+_DEAD_MAN = 0.250  # time [s] that a jog goes on after the last JOG
 
 
 class Jogging:

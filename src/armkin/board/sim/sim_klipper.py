@@ -18,8 +18,8 @@ from typing import Any
 
 from armkin.board.sim.clock import SimulatedTime
 
-END = b"\x03"
-AHEAD = 1.0  # [s] that the queue holds
+END = b"\x03"  # byte that ends a message
+AHEAD = 1.0  # motion [s] that the queue holds
 
 
 class Refused(Exception):  # noqa: N818

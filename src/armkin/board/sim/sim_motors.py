@@ -15,7 +15,7 @@ from armkin.board.sim.segment_queue import Queue
 from armkin.board.sim.sim_homing import Homing, Search
 from armkin.board.sim.sim_jogging import Jogging
 
-_STANDING = 0.001  # [s] time to a stop at which a hold stands still
+_STANDING = 0.001  # time [s] to a stop at which a hold stands still
 
 
 class Motors:

@@ -11,9 +11,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.board.sim.sim_board import SimBoard
 
-_LATE = (
-    0.02  # [s] that a board in the clock's time makes up for at once: its queue must not run dry for a busy computer
-)
+_LATE = 0.02  # time [s] that a board in the clock's time makes up for at once, so that its queue is not dry
 
 
 class SimPort:

@@ -25,8 +25,8 @@ from armkin.board.feetech.registers import (
 )
 from armkin.board.sim.clock import SimulatedTime
 
-PAUSE = 0.002  # [s] between the bytes of a packet at most
-FASTEST = 3400  # [counts/s] that a servo makes
+PAUSE = 0.002  # time [s], at most, between the bytes of a packet
+FASTEST = 3400  # speed [counts/s], at most, of a servo
 
 
 class Servo:

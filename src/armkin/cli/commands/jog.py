@@ -15,7 +15,7 @@ from armkin.cli.options import Json, Robot, Scene
 from armkin.errors import UsageError
 from armkin.model import units
 
-_LONGEST = 60.0  # [s]
+_LONGEST = 60.0  # length [s], at most, of a jog
 
 
 def jog(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 _COLUMNS = ("alpha", "a", "d", "theta", "type", "lower", "upper", "home", "name")
 _VARIABLE = re.compile(r"([+-]?)(?:q|theta|th|d|s|\u03b8)_?[0-9]{0,2}\*? *(?:([+-]) *([0-9.pi/*\u03c0]{1,20}))?", re.I)
-_LARGEST_FILE = 1_000_000
+_LARGEST_FILE = 1_000_000  # size [bytes], at most, of a table
 
 ArmName = Annotated[str, typer.Argument(metavar="NAME", help="The arm's name; the file is NAME.yaml.")]
 DhRow = Annotated[

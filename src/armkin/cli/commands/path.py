@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-_STEP = 0.01  # [s] between the rows of --out
+_STEP = 0.01  # time [s] between the rows of --out
 
 PathSource = Annotated[
     str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
     from armkin.model.arm import Arm
 
-_LONGEST = 3600.0  # [s]
-_RATE = 10  # [rows/s]
+_LONGEST = 3600.0  # time [s], at most, that the arm is relaxed and recorded
+_RATE = 10  # rows a second
 
 
 def relax(

@@ -14,7 +14,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 
-_EVERY = 0.2  # [s]
+_EVERY = 0.2  # time [s] between two readings
 
 
 def status(

@@ -11,7 +11,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName, only_port
 from armkin.errors import LinkError, UsageError
 
-_PATIENCE = 15.0  # [s] for an arm to come to rest
+_PATIENCE = 15.0  # time [s] for an arm to come to rest
 
 
 def stop(

@@ -43,8 +43,8 @@ _NAMED = {  # numbers that the method reads, by the names that they have in Pyth
 }  # fmt: skip
 BRANCHES = MOST
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
-OWN = 2  # of a kind of poses
-PASSES = 4  # of the seven; what they leave open is told as doubt
+OWN = 2  # pencils of its own that a kind of poses has
+PASSES = 4  # passes, of the seven, that the C code makes; what they leave open is told as doubt
 
 
 def has_form(elimination: Elimination) -> bool:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-POSTURES = 8
-_CLEAR = 0.02  # singular value, lengths in reaches: far from singular
+POSTURES = 8  # postures whose values are written
+_CLEAR = 0.02  # singular value, lengths in reaches, from which on a posture is far from singular
 
 
 def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> str:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _KINDS = {"floor": 0, "box": 1, "capsule": 2}
-_NUMBERS = 15  # of the largest shape
+_NUMBERS = 15  # numbers of the largest shape
 
 
 class Tables(NamedTuple):

@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _PARTS = Path(__file__).parent / "parts"
-_ALONE = 1e-6  # [rad] from half a turn, from where on a limit leaves one copy of a value
-_ROUNDED = 5e-6  # how far a pose of six printed digits may be from orthonormal
+_ALONE = 1e-6  # distance [rad] from half a turn from which on a limit leaves one copy of a value
+_ROUNDED = 5e-6  # distance from orthonormal, at most, of a pose of six printed digits
 _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
  *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""

@@ -7,7 +7,7 @@ Lengths are in units of the arm's reach, angles in rad, unless a line says other
 
 # ---- what decides a word: docs/solution.md, "Constants", derives each, and no other does
 SOLUTION = 1e-9  # residual up to which joint values solve a target
-REACH = 0.1  # [rad, reaches] movement along a component from which on a joint moves on a self-motion manifold
+REACH = 0.1  # movement [rad, reaches] along a component from which on a joint moves on a self-motion manifold
 ERROR = 1e-13  # residual that rounding leaves: some hundred operations on numbers of the reach's size
 CURVATURE = 100.0  # curvature [1/rad, 1/reach] of the sharpest fold
 WEAK = 1e-6  # singular value below which a direction is lost

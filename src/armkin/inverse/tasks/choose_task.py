@@ -15,7 +15,7 @@ from armkin.model.arm import Arm
 from armkin.model.joint_chain import Chain, joint_axes
 from armkin.model.units import radian_or_reach
 
-NEARLY_PARALLEL = 3e-3  # [rad] axes this close count as parallel for the choice of a task, not for its solution
+NEARLY_PARALLEL = 3e-3  # angle [rad] of axes that count as parallel for the choice of a task, not for its solution
 INDEPENDENT = 1e-4  # singular value from which on a task's rows are independent
 Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 

@@ -13,7 +13,7 @@ from armkin.keep_out.shapes.segment_distances import segment_distance
 if TYPE_CHECKING:
     from armkin.robot_file.keep_out_keys import Entry
 
-_ROUND = 24  # corners of its circles in pictures
+_ROUND = 24  # corners of a capsule's circles in pictures
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,11 +21,11 @@ from armkin.motion.branches.linked_branches import ENDS
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_NEAR = 10 * ENDS  # [mm] of a chain's end before the boundary
-_ALIKE = 1e-3  # [rad | mm] between the ends of two chains that are one
-_SAME = 1e-4  # [rad | mm] between two postures that are one
-_MOST = 8  # boundaries on the way: a path along one has thousands, and its chains go on anyway
-_WAYS = 64  # chains in all, as every boundary may multiply them: what goes through one more boundary comes last
+_NEAR = 10 * ENDS  # distance [mm] of a chain's end before the boundary
+_ALIKE = 1e-3  # distance [rad | mm] between the ends of two chains that are one
+_SAME = 1e-4  # distance [rad | mm] between two postures that are one
+_MOST = 8  # boundaries on the way, at most: a path along one has thousands, and its chains go on anyway
+_WAYS = 64  # chains, at most, as every boundary may multiply them: what goes through one more boundary comes last
 
 
 def add_boundary_chains(

@@ -22,9 +22,9 @@ from armkin.motion.branches.joint_steps import joint_change
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_STEPS, _STAYS = 8, 1e-6  # of Newton's method on one's self-motion; [rad | mm] of a joint that is not free
-_BLOCK = 16_384  # samples that are solved at once at most
-_APART = 8  # samples from one of a few that are solved first to the next
+_STEPS, _STAYS = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
+_BLOCK = 16_384  # samples solved at once at most
+_APART = 8  # stride of the few samples that are solved first
 
 
 @dataclass

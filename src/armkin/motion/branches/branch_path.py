@@ -34,12 +34,12 @@ from armkin.motors import motor_accel
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_GRID = 1000  # points of a route's grid, at least
-_STEP = 1.0  # [mm] between the first samples, at most
-_SAMPLES = (200, 20_000)
-_MANY = 8  # rests: what lies between more of them is planned together, so many samples at once
-_AT_ONCE = 8192
-_FARTHEST = 2.0  # [mm] between those of a path that has more
+_GRID = 1000  # points, at least, of a route's grid
+_STEP = 1.0  # distance [mm], at most, between the first samples
+_SAMPLES = (200, 20_000)  # samples of a route, at least and at most
+_MANY = 8  # rests from which on what lies between them is planned together, so many samples at once
+_AT_ONCE = 8192  # samples between rests that are planned at once
+_FARTHEST = 2.0  # distance [mm], at most, between the samples of a path that has more
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from armkin.formula.arrays import Array
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-TURN = 2 * np.pi
-LEAST_LEVER = 30.0  # [mm] of a turn that does not move the tip: the tool's direction counts, too
+TURN = 2 * np.pi  # whole turn [rad]
+LEAST_LEVER = 30.0  # lever [mm], at least, of a turn that does not move the tip: the tool's direction counts, too
 
 
 def levers(arm: Arm) -> Array:

@@ -21,13 +21,13 @@ from armkin.motion.branches.joint_steps import chord_bound, joint_change, larges
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SHORTEST = 1e-9  # of the route: what is not linked there is a jump
-ENDS = 0.002  # [mm] how finely the end of a branch, or the crossing of a limit, is found
+SHORTEST = 1e-9  # step, as a share of the route, below which what is not linked is a jump
+ENDS = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
 _TORN = 3  # parts of a step in which branches end: where they are more, branches end everywhere
-_PARTS = (8, 32)  # of a step that is divided: with many such steps, and with few
-_AT_ONCE = 1024  # samples that are solved at once, if the parts are no fewer
-_MOST = 50_000  # samples added
-_BLOCK = 16_384  # steps that are looked at together
+_PARTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
+_AT_ONCE = 1024  # samples solved at once, if the parts are no fewer
+_MOST = 50_000  # samples added at most
+_BLOCK = 16_384  # steps looked at together
 
 
 def link_branches(

@@ -19,18 +19,18 @@ if TYPE_CHECKING:
     from armkin.motion.branches.wrist_window import Window
     from armkin.motion.tool_path.route import Route
 
-_TIMES = 16.0  # as many points, at most, where the tolerance needs them
-_ROUNDS = 8  # in which intervals are divided
-_BLOCK = 8192  # points that are looked at together
-_COARSE = 0.05  # [mm] steps are no coarser, if the tolerance is not
-_TURN = 1.6  # [rad] where slopes are exact, steps that turn by less may be coarser
-_EACH = (4, 64)  # of a section between two bends, at least, with many sections and with few
-_FEWEST = 2  # of a section where slopes are exact: they need no neighbours
-_GROWTH = 2.5  # of an interval beside the next one, at most: motions speed up and slow down beside bends
-_GROWS = 1.3  # times that: what is hardly longer stays
-_AROUND = 0.5  # [mm] of the way, about a given point
-_ALIKE = 1e-3  # distances of points that differ by less, relative, are alike: the first place is told
-_REST = 32  # intervals from rest to rest, at least, where there are many rests
+_TIMES = 16.0  # factor, at most, on the number of points where the tolerance needs more
+_ROUNDS = 8  # rounds in which intervals are divided
+_BLOCK = 8192  # points looked at together
+_COARSE = 0.05  # step [mm], at most, if the tolerance is not larger
+_TURN = 1.6  # turn [rad] below which a step may be coarser where slopes are exact
+_EACH = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
+_FEWEST = 2  # points of a section where slopes are exact: they need no neighbours
+_GROWTH = 2.5  # ratio of an interval to the next one, at most: motions speed up and slow down beside bends
+_GROWS = 1.3  # excess of that ratio, as a factor, that stays: the interval is hardly longer
+_AROUND = 0.5  # length [mm] of the way about a given point
+_ALIKE = 1e-3  # relative difference of distances that are alike: the first place is told
+_REST = 32  # intervals, at least, from rest to rest where there are many rests
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 

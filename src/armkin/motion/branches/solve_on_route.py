@@ -17,13 +17,13 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
-DAMPING = (2e-4, 0.02, 0.5)  # [mm/rad] at first, and where that swings joints round beside a singularity
-_BLOCK = 8192  # points that are looked at together
-_SETTLED = 1e-8  # of a Newton step, relative: the next one would be nothing
-_SHORT, _QUADRATIC = 1e-5, 1e-3  # so is it after a short step, by so much shorter than the one before
-_ASIDE = 1e-6  # [mm] along the route, to the target that tells a slope
-_TELLING = 0.02  # [mm/rad] damping of slopes: rounding is multiplied little
-_LOST = 1e-5  # of a slope: where damping takes more a singularity is near
+DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad] at first, and where that swings joints round beside a singularity
+_BLOCK = 8192  # points looked at together
+_SETTLED = 1e-8  # relative length of a Newton step after which the next one would be nothing
+_SHORT, _QUADRATIC = 1e-5, 1e-3  # relative length of a step, and its ratio to the one before: the next one is nothing
+_ASIDE = 1e-6  # distance [mm] along the route to the target that tells a slope
+_TELLING = 0.02  # damping [mm/rad] of slopes: rounding is multiplied little
+_LOST = 1e-5  # share of a slope that damping takes: where it is more a singularity is near
 
 
 def correct_to_route(

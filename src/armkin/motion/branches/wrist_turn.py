@@ -29,19 +29,19 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
-ASIDE = 0.5  # of the tolerance: so far the tip may go aside
-_NEAR = 2.0  # tolerances: a wrist that stays farther from straight is not looked at
-_ARM = 0.1  # [rad] of the first three joints between two postures that are a flip of the wrist apart
-_HALF, _GROW, _WIDTHS = 0.25, 1.5, 14  # [mm] half of the least window; the next one; how many are tried
-_GAP = 0.1  # [mm] between the end of one and the begin of the next
-_STEP = 0.01  # [mm] to either side, for slopes
+ASIDE = 0.5  # share of the tolerance by which the tip may go aside
+_NEAR = 2.0  # distance [tolerances] from straight beyond which a wrist is not looked at
+_ARM = 0.1  # movement [rad] of the first three joints between two postures that are a flip of the wrist apart
+_HALF, _GROW, _WIDTHS = 0.25, 1.5, 14  # half [mm] of the least window; factor from one to the next; how many are tried
+_GAP = 0.1  # distance [mm] between the end of one window and the begin of the next
+_STEP = 0.01  # distance [mm] to either side at which slopes are taken
 _LOOKED = 97  # places in a window at which the tool's rotation is looked at
-_MOST = 16  # singularities on the way
-_EXACT = 1e-6  # [mm and rad] a posture misses its target by less
-_ROUNDING = 1e-12  # of the wrist's volume
-_TOLD = 1e-4  # of the wrist's volume: less does not tell joint 4
-_LEAST = 1e-8  # [1/mm] what a millimetre counts beside a radian, where the tool's direction must be kept
-_STEPS = 8  # of Newton's method to a straight wrist
+_MOST = 16  # singularities, at most, on the way
+_EXACT = 1e-6  # error [mm and rad] below which a posture meets its target
+_ROUNDING = 1e-12  # share of the wrist's volume that is rounding
+_TOLD = 1e-4  # share of the wrist's volume below which it does not tell joint 4
+_LEAST = 1e-8  # weight [1/mm] of a millimetre beside a radian where the tool's direction must be kept
+_STEPS = 8  # steps of Newton's method to a straight wrist
 
 
 def has_wrist(arm: Arm) -> bool:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Detour, Route
 
-_STEPS = 12  # of Newton's method
-_LONGEST = 0.1  # [rad] of one of them
+_STEPS = 12  # steps of Newton's method
+_LONGEST = 0.1  # length [rad], at most, of a step of Newton's method
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-_BLOCK = 16_384  # times or grid points that are looked at together
+_BLOCK = 16_384  # times or grid points looked at together
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-_FIRST = 0.5  # [s] between two of the first samples, at most
-_INSIDE = (0.21, 0.5, 0.79)  # where between two samples it is looked at
+_FIRST = 0.5  # time [s], at most, between two of the first samples
+_INSIDE = (0.21, 0.5, 0.79)  # parameters between two samples at which the motion is looked at
 
 
 def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:

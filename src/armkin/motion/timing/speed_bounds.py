@@ -12,7 +12,7 @@ from armkin.formula.arrays import Array, Int
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_scan import Least, backward_step, concatenate_least, forward_step, least_of, scan
 
-TINY = 1e-300
+TINY = 1e-300  # floor of a divisor: it keeps a quotient finite where the divisor is zero
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
 _PAIRS = 4096  # intervals whose rows are compared pair by pair at once
 

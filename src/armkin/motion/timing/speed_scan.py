@@ -8,10 +8,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Int
 
-_FEWEST, _MOST = 8, 4096  # intervals that are followed one by one before it is asked whether that can end
-_TOGETHER = 32  # runs: more of them go side by side
-_LONGEST = 64  # steps of runs side by side, while there are no more of them
-_TIMES = 8  # after which they go one by one in any case
+_FEWEST, _MOST = 8, 4096  # intervals followed one by one, at least and at most, before it is asked whether that can end
+_TOGETHER = 32  # runs beyond which they go side by side
+_LONGEST = 64  # steps of runs side by side while there are few of them
+_TIMES = 8  # rounds after which runs go one by one in any case
 
 
 class Least(NamedTuple):

@@ -27,13 +27,13 @@ from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, interval_parts
 
 _NEIGHBOURS = 5  # samples that give a slope
-_SECTIONS = 16  # of samples, between breaks: more are worked on together
-_MOST = 1e18  # of x, where nothing bounds it
-_EXCESS = 1.001  # of an acceleration, or of a speed squared, between grid points
-_LITTLE = 1.0002  # less of it is left as it is: most of the others are above 1 by rounding
-_ROUNDS = 8
+_SECTIONS = 16  # sections of samples between breaks from which on they are worked on together
+_MOST = 1e18  # bound of x where nothing bounds it
+_EXCESS = 1.001  # factor, at most, on an acceleration, or on a speed squared, between grid points
+_LITTLE = 1.0002  # factor up to which an excess is left as it is: most of the others are above 1 by rounding
+_ROUNDS = 8  # rounds, at most, in which excesses are taken away
 _SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
-_FEW = 400  # samples of a way: the law needs more grid points
+_FEW = 400  # samples of a way up to which the law needs more grid points
 
 
 @dataclass(frozen=True)

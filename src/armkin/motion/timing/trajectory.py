@@ -23,7 +23,7 @@ from armkin.motion.timing.profile import Profile
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LONGEST = 86_400  # [s]
+LONGEST = 86_400  # length [s], at most, of a trajectory: a day
 BRAKE = 0.625  # share of the motors' accelerations with which a board stops on a curve
 
 

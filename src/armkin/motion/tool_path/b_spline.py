@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool, Int
 
 _RIDGE = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
 _ENDS = 1e6  # weight of a curve's ends, which it passes
-_DENSE = 16  # blocks: so few are solved as one system
+_DENSE = 16  # blocks up to which they are solved as one system
 _THIRDS = np.arange(4) / 3
 _TO_POWERS = np.linalg.inv(np.vander(_THIRDS, increasing=True))  # values at thirds -> coefficients
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 
-CORNER = np.deg2rad(20.0)  # a larger turn is rounded
-SHORT = 1 / 3  # of a chord: a shorter neighbour tells nothing of its curvature
-_SAME = 1e-6  # [mm] nearer points are one
+CORNER = np.deg2rad(20.0)  # angle [rad] of a turn, above which it is rounded
+SHORT = 1 / 3  # share of a chord: a shorter neighbour tells nothing of its curvature
+_SAME = 1e-6  # distance [mm] of points that are one
 
 
 @dataclass(frozen=True)

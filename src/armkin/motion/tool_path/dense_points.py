@@ -29,10 +29,10 @@ from armkin.motion.tool_path.path_pieces import (
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
 
-FIT = 0.94  # share of the tolerance: points to curve (chords to curve: less, see `fit_points`)
-PLAN = (0.1, 0.05, 0.02)  # curve to motion, whatever the points; the first with which all points are within it
-_AT_ONCE = 8192  # points that are fitted together, about
-_FARTHEST_TURN = 5.0  # [rad] that rotation vectors tell from less
+FIT = 0.94  # share of the tolerance from points to curve (from chords to curve: less, see `fit_points`)
+PLAN = (0.1, 0.05, 0.02)  # shares of the tolerance from curve to motion: the first that holds for all points is taken
+_AT_ONCE = 8192  # points, about, that are fitted together
+_FARTHEST_TURN = 5.0  # turn [rad], at most, that rotation vectors tell from less
 _NAN = float("nan")
 
 

@@ -18,11 +18,11 @@ from armkin.motion.tool_path.b_spline import Layout
 from armkin.motion.tool_path.chords import CORNER, Chords, turn_angles
 from armkin.motion.tool_path.least_knots import Rows, least_knots
 
-REVERSAL = np.deg2rad(160.0)  # a larger one is a stop
-_SCALES = (4.0, 16.0)  # tolerances: from so far off a corner is still one, and a recorder's noise is none
-_ALIKE = 0.1  # [rad] turns that differ by less are the same
+REVERSAL = np.deg2rad(160.0)  # turn [rad] from which on a corner is a stop
+_SCALES = (4.0, 16.0)  # distances [tolerances] from which a corner is still one, and a recorder's noise is none
+_ALIKE = 0.1  # difference [rad] of turns that are the same
 _BETWEEN = 6  # places of each cubic that are held to its chords in the end
-_TRIES = 5  # after which a curve that leaves its chords is given up
+_TRIES = 5  # tries after which a curve that leaves its chords is given up
 
 
 @dataclass(frozen=True)

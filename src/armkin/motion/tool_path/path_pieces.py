@@ -23,12 +23,12 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
 from armkin.motion.tool_path.b_spline import solve_banded
 
-PER_RADIAN = 30.0  # [mm/rad]
-SMALL = 1e-9  # [mm] shorter pieces are no pieces
+PER_RADIAN = 30.0  # lever [mm/rad] at which a turn of the tool counts as a way
+SMALL = 1e-9  # length [mm] below which a piece is none
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
 _TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
-_TABLES = 20_000  # of all spans
-_EVEN, _EXACT = 1e-9, 1e-6  # of a slope: less change is none; [mm] of a length
+_TABLES = 20_000  # intervals of all spans' tables
+_EVEN, _EXACT = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
 
 
 def rotation_matrices(w: Array) -> Array:

@@ -15,8 +15,8 @@ from armkin.motion.timing.trajectory import group_numbers
 from armkin.motion.tool_path.fit_points import REVERSAL
 from armkin.motion.tool_path.path_pieces import SMALL, Dense, Piece, blend
 
-_SAME = 1e-6  # [mm] breaks that are nearer are one
-_SMOOTH = 1e-3  # [rad] between two directions that count as one
+_SAME = 1e-6  # distance [mm] of breaks that are one
+_SMOOTH = 1e-3  # angle [rad] between two directions that count as one
 
 
 @dataclass(frozen=True)

@@ -22,27 +22,27 @@ from armkin.board.firmware.wire.protocol import BLOCK, COARSE, FINE, HALF, STEP,
 
 Counts = NDArray[np.int64]
 
-CLOCK = 16_000_000  # [1/s] of every board so far
-MIN_INTERVAL = 576  # [cycles] between ticks, that every board makes
+CLOCK = 16_000_000  # clock rate [1/s] of every board so far
+MIN_INTERVAL = 576  # interval [cycles] between ticks that every board makes
 
-_TICK, _TICK_QUICK = 1.12, 1.28  # shortest intervals that a tick lasts at a segment's fast end
-_TICK_S = 20e-6  # [s] a tick lasts at least, unless a motor steps faster: no edge is farther off than that
-_COARSEST = 55e-6  # [s] of a tick, where a finer one would not fit the rates as well
-_ACCEL = 1.014  # of its acceleration, that a piece has at most, or its ends' speeds are nearer to each other:
-_LESS = 0.975  # so much at most, which is a jump of a few cycles of the interval between pieces
-_STEADY = 0.004  # change of speed that is none
-_EVEN = 0.02  # [s] that a piece of one speed lasts whose intervals grow bit by bit: in less that is too great a change
+_TICK, _TICK_QUICK = 1.12, 1.28  # shortest length of a tick at a segment's fast end, in intervals that the board makes
+_TICK_S = 20e-6  # length [s] of a tick, at least, unless a motor steps faster: no edge is farther off than that
+_COARSEST = 55e-6  # length [s] of a tick where a finer one would not fit the rates as well
+_ACCEL = 1.014  # factor on its acceleration that a piece has at most; above it its ends' speeds come nearer
+_LESS = 0.975  # factor, at least, on that difference of speeds: the jump is a few cycles of the interval between pieces
+_STEADY = 0.004  # relative change of speed that counts as none
+_EVEN = 0.02  # length [s] of a piece of one speed whose intervals grow bit by bit: in less the change is too great
 _FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
-_DRIFT = 0.02  # steps
+_DRIFT = 0.02  # error [steps], at most, that adds up
 _WHOLE = 8  # ticks a step, up to which a ramp's are as many for each step: a tick is felt
-_SLOW = 40  # ticks a step, from where the ticks need not fit the steps
-_FEWEST = 32  # ticks of a segment, where the board can make them
-_LONGEST = 50_000  # [cycles] of an interval; the device takes 65535
-_QUICK = 1000, 20  # ticks of a segment whose `bend` counts with each, at most; and such a bend at least
-_BEND = 32767  # greatest bend
-_MONOTONE = 1.98  # times as far as its fast end a parabola's slow end may be from the mean: from 2 on it turns
-_CHOICE, _CHOICES = 32, 12  # one in so many ticks of a ramp may be left out, so that its intervals are whole cycles
-_MOST = 16_000  # ticks of a segment: as many as a rate is exact for to a quarter of a step
+_SLOW = 40  # ticks a step, from where on the ticks need not fit the steps
+_FEWEST = 32  # ticks of a segment, at least, where the board can make them
+_LONGEST = 50_000  # interval [cycles], at most, of a tick; the device takes 65535
+_QUICK = 1000, 20  # ticks, at most, of a segment whose `bend` counts with each; least such bend
+_BEND = 32767  # greatest bend of a segment
+_MONOTONE = 1.98  # ratio of a parabola's slow end to its fast one, in distances from the mean: from 2 on it turns
+_CHOICE, _CHOICES = 32, 12  # ticks of a ramp of which one may be left out, for intervals of whole cycles; at most
+_MOST = 16_000  # ticks, at most, of a segment: as many as a rate is exact for to a quarter of a step
 
 
 class Segments(Protocol):

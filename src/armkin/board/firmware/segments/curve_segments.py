@@ -24,14 +24,14 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Stretch
 
-_LEAST, _MOST = 0.010, 0.050  # [s] a segment
-_GROWTH = 0.12  # of the time since the start, or to the end
-_FINE = 0.005  # [s] between the samples from which the spans are chosen
+_LEAST, _MOST = 0.010, 0.050  # length [s] of a segment, at least and at most
+_GROWTH = 0.12  # length of a segment, at most, as a share of the time since the start, or to the end
+_FINE = 0.005  # time [s] between the samples from which the spans are chosen
 _QUEUED = 25  # segments that are surely in the board's queue
-_SETTLING = 0.05  # of the greatest acceleration
-_JUMP = 1.1  # of the greatest acceleration
-_SAMPLES = 20_000  # that are looked at at once
-_BLOCK = 512  # segments that are made at once
+_SETTLING = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
+_JUMP = 1.1  # factor on the motors' accelerations that a segment has at most
+_SAMPLES = 20_000  # samples looked at at once
+_BLOCK = 512  # segments made at once
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
     from armkin.formula.arrays import Array
 
-_NEAR = 1.5  # steps that every motor of an arm on its plan is within
+_NEAR = 1.5  # distance [steps] of a plan that every motor of an arm on it keeps within
 
 
 @dataclass(frozen=True)

@@ -29,22 +29,22 @@ from armkin.motion.timing.profile import Profile, trapezoid
 
 # A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right
 # to 0.53 (ratio - 1)^2, 1.5 % at 1.17. All of a ramp fits into the board's queue (32).
-_RATIO = 1.14  # with fewer segments than `_RAMP`
+_RATIO = 1.14  # ratio of speeds of a segment in a ramp with fewer segments than `_RAMP`
 _RAMP, _SHORT, _ROUGH = 27, 13, 12  # segments of a ramp at most, see `Pieces`
-_WIDEST = 1.4  # ratio, from where the first segment gets longer instead: the board takes 5/4 of the acceleration
-_FIRST, _FIRST_ROUGH = 0.003, 0.03  # [s] a ramp's first segment at least, and four times what any other lasts at least
-_FIRST_MOST = 0.1  # [s] the same at most: the board lets a speed jump by what 50 ms of 5/4 of the acceleration make
-_BEFORE_STEP = 0.96  # of the time to its first step: until then no motor tells how it got there
-_NO_STEP = 0.49  # steps: what is left for rates' rounding
+_WIDEST = 1.4  # ratio of speeds from which the first segment gets longer: the board takes 5/4 of the acceleration
+_FIRST, _FIRST_ROUGH = 0.003, 0.03  # length [s], at least, of a ramp's first segment; in rough, four times any other
+_FIRST_MOST = 0.1  # length [s], at most, of a ramp's first segment: a board's jump is 5/4 of the acceleration in 50 ms
+_BEFORE_STEP = 0.96  # share of the time to a motor's first step: until then no motor tells how it got there
+_NO_STEP = 0.49  # part of a step that is left for the rounding of rates
 # Of its time, that such a first segment takes, at once at the speed that 1.2 of the acceleration makes in it; the
 # board's bound is 5/4. All edges come so much sooner, as far from one another as in the time law.
 UNHEARD = math.sqrt(1 / 2.4)
-_CRUISE = (0.2, 0.4)  # [s] a cruise segment
-_JERK = 0.02  # [s] a segment in which the acceleration changes
-_SPLIT = 0.08  # [s] a cruise segment whose end is one of its own
-_NONE = (0.03, 0.0006)  # of a ramp, or [s]: a cruise that is shorter belongs to the ramps
-_MAKE_UP = 0.01  # of its way in a piece, that a motor makes up for: the board takes 1.05 of its rate
-_SPARE = 0.0005  # of a piece's steps, that are left for the next one to make up for
+_CRUISE = (0.2, 0.4)  # length [s] of a cruise segment, least and greatest
+_JERK = 0.02  # length [s] of a segment in which the acceleration changes
+_SPLIT = 0.08  # length [s] of a cruise segment whose end is one of its own
+_NONE = (0.03, 0.0006)  # length of a cruise, as a share of a ramp or in [s], below which it belongs to the ramps
+_MAKE_UP = 0.01  # share of its way in a piece that a motor makes up for: the board takes 1.05 of its rate
+_SPARE = 0.0005  # share of a piece's steps that is left for the next one to make up for
 _EAGER = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
 

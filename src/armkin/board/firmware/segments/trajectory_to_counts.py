@@ -33,10 +33,10 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 
-TOLERANCE = 0.05  # [mm] between the chord of a segment and its curve
+TOLERANCE = 0.05  # distance [mm] between the chord of a segment and its curve
 
 
-FARTHEST = 2**30  # counts: half of what a board's registers hold
+FARTHEST = 2**30  # position [counts], at most: half of what a board's registers hold
 
 
 class RateError(UsageError):

@@ -6,8 +6,8 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-_LAYOUT = 2
-_AXIS = 21  # bytes
+_LAYOUT = 2  # version of the image's layout
+_AXIS = 21  # size [bytes] of an axis
 
 
 @dataclass(frozen=True)

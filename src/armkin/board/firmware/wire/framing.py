@@ -9,7 +9,7 @@ import struct
 import zlib
 from collections.abc import Iterator
 
-MAX_FRAME = 250  # payload + CRC: COBS then adds one byte
+MAX_FRAME = 250  # size [bytes] of payload and CRC: COBS then adds one byte
 
 
 def cobs_encode(raw: bytes) -> bytes:

@@ -15,13 +15,13 @@ from armkin.board.firmware.wire import protocol, reply_checks
 from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 from armkin.board.firmware.wire.serial_line import Line
 
-_RESEND = 0.03  # [s] without progress, beyond the time of the slowest answer
-_GAP = 0.004  # [s] after all that was sent has left and an answer had its time
-_LATE = 0.012  # [s] without progress, before a question is to find out
-_EAGER = 0.002  # [s] without progress, on a bad line: nothing is gained by waiting for what was damaged
-_UNDER_WAY = 1, 16  # frames, on a bad line, where what follows one that is lost was sent for nothing, and on a good one
-_BYTES = (240, 700)  # under way, on a bad line and on a good one
-QUESTION = 12  # [bytes] of a STATUS? on the line
+_RESEND = 0.03  # time [s] without progress, beyond the time of the slowest answer, after which frames are sent again
+_GAP = 0.004  # time [s] after all that was sent has left and an answer had its time
+_LATE = 0.012  # time [s] without progress before a question is to find out
+_EAGER = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
+_UNDER_WAY = 1, 16  # frames under way, on a bad line, where what follows a lost one is for nothing, and on a good one
+_BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
+QUESTION = 12  # size [bytes] of a STATUS? on the line
 
 
 @dataclass

@@ -33,7 +33,7 @@ from armkin.board.firmware.wire.segment_format import read_segment as read_segme
 from armkin.board.firmware.wire.segment_format import segment_size as segment_size
 from armkin.board.firmware.wire.segment_format import whole_steps as whole_steps
 
-VERSION = 2
+VERSION = 2  # version of the protocol
 
 
 class Type(IntEnum):
@@ -116,7 +116,7 @@ class Flag(IntFlag):
 
 MOTION_END = 1
 MOTION_WIDE = 2
-MOTION_GENTLE, GENTLE_PARTS = 2, 8  # the lowest of its bits; of the accelerations
+MOTION_GENTLE, GENTLE_PARTS = 2, 8  # lowest bit of the share of the accelerations; parts that it counts in
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 STEP = 1 << 23  # units of a rate and of a place in one step
-HALF = STEP // 2  # where an axis stands at rest, above its count
-COARSE = 1 << 8  # units of a rate from 2^-8 step a tick on
-FINE = 1 << 15  # smaller rates are sent in units of 1
-_FULL = STEP - 128  # the greatest rate: a step a tick, but for 2^-16
+HALF = STEP // 2  # place of an axis at rest, above its count
+COARSE = 1 << 8  # unit of rates from 2^-8 step a tick on, in units of a rate
+FINE = 1 << 15  # bound of smaller rates, which are sent in units of 1
+_FULL = STEP - 128  # greatest rate: a step a tick, but for 2^-16
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
 

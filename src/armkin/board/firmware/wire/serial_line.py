@@ -8,10 +8,10 @@ from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Ack, Info, Status
 from armkin.board.ports import Port
 
-_COPIES = 3  # of every frame, on a bad line, and of questions that nothing goes on without
-_LATE = 0.03  # [s] an answer may take
-_ASKING = 50  # [bytes] of a STATUS? and its answer, at least
-_PATIENCE, _SURELY = 0.05, 0.012  # [s] for an answer; beyond twice the slowest of those measured
+_COPIES = 3  # copies of every frame on a bad line, and of questions that nothing goes on without
+_LATE = 0.03  # time [s] that an answer may take
+_ASKING = 50  # size [bytes] of a STATUS? and its answer, at least
+_PATIENCE, _SURELY = 0.05, 0.012  # time [s] for an answer; time [s] beyond twice the slowest of those measured
 
 
 class Line:

@@ -15,22 +15,22 @@ from armkin.board.firmware.wire.serial_line import Line
 from armkin.board.ports import Port, leave_boot_loader
 from armkin.errors import LinkError
 
-_POLL = 0.1  # [s] between STATUS?: the board holds after 0.5 s of silence
-_POLL_NOISY = 0.025  # [s] the same on a bad line, which loses some of them
-_POLL_SOON = 0.01  # [s] while waiting for credit, which only answers bring, and for the queue's end
-_ENDS = 50  # [ms] of motion that the queue holds when its end is near
-_GIVE_UP = 1.5  # [s] without any answer,
-_TURN = 0.1  # [s] of which one turn counts at most: a program that had to wait longer for its own turn was deaf
-_QUIET = 3.0  # [s] of questions without an answer, of a board that was there
+_POLL = 0.1  # time [s] between two STATUS?: the board holds after 0.5 s of silence
+_POLL_NOISY = 0.025  # time [s] between two STATUS? on a bad line, which loses some of them
+_POLL_SOON = 0.01  # time [s] between two STATUS? while waiting for credit, which only answers bring, or for the end
+_ENDS = 50  # motion [ms] that the queue holds when its end is near
+_GIVE_UP = 1.5  # time [s] without any answer after which a board counts as gone
+_TURN = 0.1  # time [s] that one turn counts at most: a program that had to wait longer for its own turn was deaf
+_QUIET = 3.0  # time [s] of questions without an answer, of a board that was there
 _BEHIND = 16  # questions without an answer
-_STALLED = 5.0  # [s] beyond the time that all in the queue may take
-_HOLD = 15.0  # [s] that an arm may take to come to rest
-_LISTENS = 0.2  # [s] after the opening: by then a Mega's boot loader listens
-_TRIES = 0.5  # [s] in which a board that nothing has reset, or a Mega, answers
-_AGAIN = 1.8  # [s] after the opening: by then every boot loader that nobody spoke to has left
-_BOOT = 5.0  # [s] that a board may take to answer after its port was opened
-_KEPT = 1000  # bytes of what is no board's
-_PROBES = 8
+_STALLED = 5.0  # time [s] beyond what all in the queue may take
+_HOLD = 15.0  # time [s] that an arm may take to come to rest
+_LISTENS = 0.2  # time [s] after the opening by which a Mega's boot loader listens
+_TRIES = 0.5  # time [s] in which a board that nothing has reset, or a Mega, answers
+_AGAIN = 1.8  # time [s] after the opening by which every boot loader that nobody spoke to has left
+_BOOT = 5.0  # time [s] that a board may take to answer after its port was opened
+_KEPT = 1000  # bytes of what is no board's that are kept
+_PROBES = 8  # questions that a line is judged by
 
 
 class Session:
