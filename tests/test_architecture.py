@@ -54,11 +54,12 @@ MAY_IMPORT: dict[str, str] = {
     "motion/plan": "keep_out errors formula model forward inverse/tasks motion/timing motion/tool_path",
     "motion/branches": "errors formula model forward inverse/tasks inverse/numeric inverse/branches inverse/answers"
     " inverse motors motion/timing motion/tool_path motion/plan",
-    "motion": "keep_out keep_out/shapes errors formula model forward inverse/tasks inverse/numeric inverse/branches"
+    "motion": "errors formula model forward motors path_file motion/timing motion/tool_path motion/branches",
+    "motion/path_planner": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/branches"
     " inverse/answers inverse/solvers inverse motors path_file motion/timing motion/tool_path motion/plan"
-    " motion/branches",
+    " motion/branches motion",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
-    " inverse inverse/answers inverse/solvers inverse/tasks motion motion/plan path_file",
+    " inverse inverse/answers inverse/solvers inverse/tasks motion motion/plan motion/path_planner path_file",
     "export": "errors formula robot_file model forward inverse/tasks view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
@@ -68,7 +69,8 @@ MAY_IMPORT: dict[str, str] = {
     "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
     " inverse/redundant user_folders",
-    "plot": "keep_out keep_out/shapes errors files formula model forward motion motion/plan view reachability",
+    "plot": "keep_out keep_out/shapes errors files formula model forward motion/plan motion/path_planner view"
+    " reachability",
     "board/ports": "errors user_folders",
     "board/firmware/wire": "errors board/ports board/backend",
     "board/firmware/segments": "errors formula model forward motors motion motion/timing board/backend"
@@ -85,11 +87,11 @@ MAY_IMPORT: dict[str, str] = {
     " board/backend board/firmware board/grbl board/feetech board/klipper board/sim board/firmware/wire"
     " board/firmware/segments",
     "flash": "errors board_catalogue board/ports board/firmware board/firmware/wire",
-    "board": "keep_out keep_out/shapes errors signals formula model forward motors motion motion/plan motion/timing"
-    " board/ports board/backend",
+    "board": "keep_out keep_out/shapes errors signals formula model forward motors motion motion/plan"
+    " motion/path_planner motion/timing board/ports board/backend",
     "teach": "keep_out keep_out/shapes errors files formula robot_file model forward inverse inverse/tasks"
-    " inverse/branches inverse/solvers motors motion motion/plan motion/timing motion/tool_path path_file reachability"
-    " view board board/ports board/backend board/kinds board/sim export/js compiled inverse/answers",
+    " inverse/branches inverse/solvers motors motion/plan motion/path_planner motion/timing motion/tool_path path_file"
+    " reachability view board board/ports board/backend board/kinds board/sim export/js compiled inverse/answers",
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 
@@ -162,8 +164,7 @@ def test_no_row_of_the_table_contradicts_another() -> None:
 
 
 def test_the_rooms_are_those_of_the_table() -> None:
-    page = SOURCE.parent / "docs/architecture.md"
-    table = page.read_text().split("## Rooms")[1].split("\n\n")[1]
+    table = (SOURCE.parent / "docs/architecture.md").read_text().split("## Rooms")[1].split("\n\n")[1]
     rooms = re.findall(r"^\| `([a-z_/]+)` \|", table, re.M)
     assert len(rooms) == len(set(rooms))
     assert set(rooms) == {*MAY_IMPORT, "cli"}

@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     from armkin.model.lock_joints import lock as lock
     from armkin.model.lock_joints import unlock as unlock
     from armkin.motion.drawings import drawing as drawing
-    from armkin.motion.path import path as path
+    from armkin.motion.path_planner.path import path as path
     from armkin.motion.plan.path_plan import PathPlan as PathPlan
     from armkin.motion.time_law import time_law as time_law
     from armkin.motors import best_pulses as best_pulses
@@ -107,7 +107,7 @@ _HOME = {
     "lock": "model.lock_joints",
     "unlock": "model.lock_joints",
     "drawing": "motion.drawings",
-    "path": "motion.path",
+    "path": "motion.path_planner.path",
     "time_law": "motion.time_law",
     "PathPlan": "motion.plan.path_plan",
     "best_pulses": "motors",

@@ -13,9 +13,9 @@ import pytest
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
-from armkin.motion.branch_report import plan_fields, wrist_pass_lines
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_columns import Columns, Samples
+from armkin.motion.path_planner.branch_report import plan_fields, wrist_pass_lines
 from armkin.plot.path_picture import plot_path
 
 

@@ -19,7 +19,7 @@ from playwright.sync_api import Browser, Page, expect
 import armkin
 from armkin import path_file
 from armkin.errors import UsageError
-from armkin.motion.path import path
+from armkin.motion.path_planner.path import path
 from armkin.teach.one_file import arm_html
 
 POSTURE = "#q=20,-70,80,10,20,30"

@@ -15,7 +15,7 @@ from served_page import Page
 import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
-from armkin.motion.jog_line import jog_axes, jog_line
+from armkin.motion.path_planner.jog_line import jog_axes, jog_line
 
 BENT = [0.0, 60.0, -60.0]  # three_dof, far from its edges
 

@@ -215,19 +215,19 @@ def test_what_is_played_is_where_the_tip_is_however_long_it_takes(arm: armkin.Ar
 
 
 def test_an_edit_does_not_wait_for_a_plan(monkeypatch: pytest.MonkeyPatch) -> None:
-    import armkin.motion.path
+    import armkin.motion.path_planner.path
 
     with serve_robot() as server:
         page = Page(server)
         assert page.act("program", do="record", kind="joint", q=POSES[0])[0] == 200
-        begun, go_on, plan = threading.Event(), threading.Event(), armkin.motion.path.path
+        begun, go_on, plan = threading.Event(), threading.Event(), armkin.motion.path_planner.path.path
 
         def slow(*arguments: Any, **how: Any) -> Any:
             begun.set()
             assert go_on.wait(60)
             return plan(*arguments, **how)
 
-        monkeypatch.setattr(armkin.motion.path, "path", slow)
+        monkeypatch.setattr(armkin.motion.path_planner.path, "path", slow)
         answers: list[tuple[int, Any]] = []
         planning = threading.Thread(target=lambda: answers.append(page.act("plan")))
         planning.start()

@@ -14,7 +14,7 @@ from armkin.board.json_summaries import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.path_planner import HOLD
+from armkin.motion.path_planner.path_request import HOLD
 from armkin.motion.rounded_waypoints import round_waypoints
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motors import joints, motor_names, pulse_units, pulses

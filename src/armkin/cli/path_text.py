@@ -26,7 +26,7 @@ def plan_summary(plan: PathPlan, answer: dict[str, Any]) -> str:
 
 def _head_lines(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """How long it is and takes, what is held, and which branch carries which part of it."""
-    from armkin.motion.branch_report import reason_text
+    from armkin.motion.path_planner.branch_report import reason_text
 
     lines = [f"{plan.arm.name}: {answer['length_mm']:.3f} mm of path"]
     if answer["duration_s"] is not None:
@@ -58,7 +58,7 @@ def _clearance_text(near: dict[str, Any]) -> str:
 
 def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     """What it takes of the joints' limits, how near it comes to a singularity and to the path, what was changed."""
-    from armkin.motion.branch_report import deviation_text, wrist_pass_lines
+    from armkin.motion.path_planner.branch_report import deviation_text, wrist_pass_lines
 
     rows = [["share of", *plan.arm.joint_names]]
     rows += [[key, *(f"{100 * share:.1f} %" for share in shares.values())] for key, shares in answer["limits"].items()]

@@ -6,12 +6,8 @@ timing/          the law of time: how fast along a way, within the limits of joi
 tool_path/       the tool's way: lines, arcs, splines, blends, dense points, one after another
 plan/            the answer, how it is drawn, and the proof that it hits nothing
 branches/        the joints' ways: every branch along the tool's way, and the one that is taken
-plan_moves.py    goes through the moves of a path; move_kinds.py says what each kind does
-path_planner.py  the best plan of all; branch_report.py: what is said of each branch
-path.py          `armkin.path`; path_redundant.py: of arms with a redundant joint; path_held.py: joints held
+path_planner/    `armkin.path`: through the moves of a path, one after another, to their plan
 drawings.py      `armkin.drawing`: G-code and SVG as such a path
-path_outline.py  where a path leads the tool, before a branch or a place of the arm is chosen
-jog_line.py      the line of one axis that a held button moves the tip along
 
 The way of waypoints:
 

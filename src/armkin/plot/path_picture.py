@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.forward import position
 from armkin.model import units
-from armkin.motion.branch_report import deviation_text
+from armkin.motion.path_planner.branch_report import deviation_text
 from armkin.plot.canvas import flat_axes, picture, space_axes, true_proportions
 from armkin.view.skeleton import skeleton
 

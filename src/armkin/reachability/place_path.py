@@ -48,7 +48,7 @@ def path_of(targets: Any) -> PathFile | None:
 
 def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
     """The task, and the targets of each way that one branch is to carry."""
-    from armkin.motion.path_outline import route_targets
+    from armkin.motion.path_planner.path_outline import route_targets
 
     task, routes = route_targets(arm, file, STEP * arm.reach)
     return task, [np.asarray(way) for way in routes]
@@ -57,7 +57,7 @@ def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
 def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
     from armkin.inverse.solvers.redundant import redundancy
-    from armkin.motion.path_redundant import values_to_hold
+    from armkin.motion.path_planner.redundant_joint import values_to_hold
 
     spare = redundancy(arm, file.task)
     return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))
@@ -83,7 +83,7 @@ def plan_from_place(
     file: PathFile,
 ) -> PathFromPlace:
     """The path's plan from a place, or why there is none."""
-    from armkin.motion.path import path
+    from armkin.motion.path_planner.path import path
 
     anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
     try:

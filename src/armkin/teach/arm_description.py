@@ -93,7 +93,7 @@ def _obstacle_triangles(arm: Arm) -> list[float]:
 
 def tip_jog_axes(arm: Arm) -> list[str]:
     """The axes that the tip may be jogged along: none where no task fits."""
-    from armkin.motion.jog_line import jog_axes
+    from armkin.motion.path_planner.jog_line import jog_axes
 
     try:
         return list(jog_axes(arm))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned
     from armkin.board.backend.board import Board
     from armkin.formula.arrays import Array
-    from armkin.motion.jog_line import Frame
+    from armkin.motion.path_planner.jog_line import Frame
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.teach.board_thread import BoardThread, Job
     from armkin.teach.tabs import Action, Fields, Tab
@@ -145,7 +145,7 @@ class BoardActions:
         if "axis" not in fields:
             joint = request_checks.index_field(fields, "joint", self.arm.n)
             return lambda machine: self._jog(machine, joint, percent)
-        from armkin.motion.jog_line import jog_axes
+        from armkin.motion.path_planner.jog_line import jog_axes
 
         axis, frame = request_checks.text_field(fields, "axis", 10), request_checks.text_field(fields, "frame", 10)
         if axis not in jog_axes(self.arm) or frame not in ("base", "tool"):
@@ -247,7 +247,7 @@ class BoardActions:
 
     def _jog_tip(self, machine: Backend, axis: str, frame: Frame, share: float) -> None:
         """Line after line along an axis; each is planned to its rest, and held on its way when nobody asks for it."""
-        from armkin.motion.jog_line import jog_line
+        from armkin.motion.path_planner.jog_line import jog_line
 
         _prepare_motors(machine)
         why = ""

@@ -138,7 +138,7 @@ class Program:
         """The motion; start: (n,) [rad | mm] where the arm stands, None: in its home pose; speed: a fraction."""
         if not self.moves:
             raise UsageError("the program has no moves: record one")
-        from armkin.motion.path import path
+        from armkin.motion.path_planner.path import path
 
         return path(self.arm, self.file(), start=start, speed=speed)
 

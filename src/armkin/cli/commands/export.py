@@ -137,7 +137,7 @@ def _write_html(arm: Arm, task: str | None, path: str | None, meshes: str | None
     plan = None
     if path is not None:
         from armkin import path_file
-        from armkin.motion.path import path as planned
+        from armkin.motion.path_planner.path import path as planned
 
         file = path_file.read_path_file(path)
         path_file.check_robot(file, arm.name, arm.path)

@@ -278,8 +278,8 @@ def _make_plan(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str
     """The plan; of a path that is not carried, what is known of it is printed first."""
     try:
         if locked:
-            from armkin.motion.path_held import path_held
-            from armkin.motion.path_planner import PathRequest
+            from armkin.motion.path_planner.held_joints import path_held
+            from armkin.motion.path_planner.path_request import PathRequest
 
             plan = path_held(arm, moves, locked, PathRequest(**options))
         else:
@@ -311,7 +311,7 @@ def _lay_rehearsal(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] |
 
 def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
-    from armkin.motion.branch_report import plan_fields
+    from armkin.motion.path_planner.branch_report import plan_fields
 
     segments = None if laid is None else sum(part.segments for part in laid[plan.approach is not None :])
     return {**render.head(plan.arm), **plan_fields(plan), "segments": segments}

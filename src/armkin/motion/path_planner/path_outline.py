@@ -9,9 +9,9 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.motion.branches.branch_path import Pace
-from armkin.motion.move_kinds import MOVES
-from armkin.motion.path_planner import TOLERANCE, default_corner_blend
-from armkin.motion.plan_moves import PathOptions, Walk
+from armkin.motion.path_planner.move_kinds import MOVES
+from armkin.motion.path_planner.move_walk import PathOptions, Walk
+from armkin.motion.path_planner.path_request import TOLERANCE, default_corner_blend
 from armkin.motion.tool_path.path_pieces import line
 from armkin.motion.tool_path.route import join_pieces
 

@@ -14,7 +14,7 @@ from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import Polyline
 
 if TYPE_CHECKING:
-    from armkin.motion.plan_moves import Walk
+    from armkin.motion.path_planner.move_walk import Walk
     from armkin.path_file import Move
 
 

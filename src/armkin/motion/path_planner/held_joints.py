@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 from armkin.model.limits import check_limits
 from armkin.model.lock_joints import lock, unlock
 from armkin.motion.joint_moves import approach_move, check_jerk, check_rates, straight_move
-from armkin.motion.path_planner import PathRequest, plan_path
+from armkin.motion.path_planner.path_request import PathRequest, plan_path
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.trajectory_proof import prove_plan
 from armkin.motion.timing.cubic_knots import Knots

@@ -20,11 +20,11 @@ from armkin.inverse.solve import isolated_branches as ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside_limits, outside_text
-from armkin.motion import branch_report
 from armkin.motion.branches.branch_path import Pace, carry_route, run_stretches, starts_at
 from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.joint_moves import approach_move, straight_move
+from armkin.motion.path_planner import branch_report
 from armkin.motion.plan.path_plan import Marker, PathPlan
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, joint_way, joint_ways

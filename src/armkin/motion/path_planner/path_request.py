@@ -13,10 +13,10 @@ from armkin.formula.arrays import Array
 from armkin.motion.branches import wrist_turn
 from armkin.motion.branches.branch_path import Pace
 from armkin.motion.joint_moves import check_jerk, check_share
-from armkin.motion.move_kinds import MOVES
+from armkin.motion.path_planner.move_kinds import MOVES
+from armkin.motion.path_planner.move_walk import PathOptions, Walk
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.trajectory_proof import prove_plan
-from armkin.motion.plan_moves import PathOptions, Walk
 from armkin.motors import legal_with_same_pulses, undriven_joints
 
 if TYPE_CHECKING:

@@ -18,13 +18,13 @@ from armkin.inverse.solve import ik
 from armkin.inverse.solvers.redundant import Redundancy, moved, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual_arm
-from armkin.motion.path_held import path_held
-from armkin.motion.path_outline import route_targets
+from armkin.motion.path_planner.held_joints import path_held
+from armkin.motion.path_planner.path_outline import route_targets
 from armkin.motion.tool_path import path_numbers
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
-    from armkin.motion.path_planner import PathRequest
+    from armkin.motion.path_planner.path_request import PathRequest
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import Move, PathFile
 

@@ -16,7 +16,7 @@ from armkin.keep_out.clearance import clearance
 from armkin.model.target_numbers import targets_out
 from armkin.model.units import radian_or_reach
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.path import path
+from armkin.motion.path_planner.path import path
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
