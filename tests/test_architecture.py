@@ -265,6 +265,18 @@ def test_no_conditional_expression_stands_in_another() -> None:
     assert not nested
 
 
+def test_at_most_three_values_are_assigned_at_once() -> None:
+    """One by one by a tuple on the right: what belongs together stands on one line."""
+    crowded = {
+        f"{module}:{node.lineno}"
+        for module, path in MODULES.items()
+        for node in _tree_nodes(path)
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple)
+        if isinstance(node.value, ast.Tuple) and len(node.value.elts) > 3
+    }
+    assert not crowded
+
+
 def _branch_count(function: ast.FunctionDef) -> int:
     """Ways through a function, one more than its decisions; functions in it are counted by themselves."""
     left: list[ast.AST] = [*function.body]

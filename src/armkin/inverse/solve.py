@@ -178,10 +178,10 @@ def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
 
 def _as_commanded(arm: Arm, solved: Solutions) -> Solutions:
     """Solutions in actual joint values as those in commanded ones."""
-    q, near, interval, task = solved.q / arm.ratio, solved.near / arm.ratio, solved.interval, solved.task.name
+    near, interval, task = solved.near / arm.ratio, solved.interval, solved.task.name
     if interval is not None and (free := redundancy(arm, task)) is not None:
         interval = np.sort(interval / arm.ratio[free.joint], axis=-1)
-    return replace(solved, arm=arm, task=task_for(arm, task), near=near, q=q, interval=interval)
+    return replace(solved, arm=arm, task=task_for(arm, task), near=near, q=solved.q / arm.ratio, interval=interval)
 
 
 def _by_slower_class(

@@ -100,9 +100,8 @@ def as_solutions(
     """The answer of a batch of shape lead; near: (n,) or (*lead, n), as it was given."""
     arm, task, target, _ = goals
     reference = np.broadcast_to(near.copy(), (*lead, arm.n))
-    q, valid, within, branch, status, free, complete, target, rounding = (
-        x.reshape((*lead, *x.shape[1:])) for x in (*batch, target, rounding)
-    )
+    shaped = (x.reshape((*lead, *x.shape[1:])) for x in (*batch, target, rounding))
+    q, valid, within, branch, status, free, complete, target, rounding = shaped
     return Solutions(arm, task, target, reference, q, valid, within, branch, status, free, *text, complete, rounding)
 
 
@@ -116,7 +115,8 @@ def write_branches(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, lab
     if ((label < 0) & valid).any() or ((np.diff(ordered) == 0) & (ordered[:, 1:] >= 0)).any():
         label = complete_labels(label, valid)
     copies, inside = nearest_row(arm, np.nan_to_num(q), near[:, None, :])
-    batch.q[rows], batch.valid[rows], batch.within[rows], batch.branch[rows] = np.nan, False, False, -1
+    batch.q[rows], batch.branch[rows] = np.nan, -1
+    batch.valid[rows] = batch.within[rows] = False
     batch.q[rows, :width] = np.where(valid[:, :, None], copies, np.nan)
     batch.valid[rows, :width] = valid
     batch.within[rows, :width] = inside & valid

@@ -142,9 +142,8 @@ class Position:
         g = [self._affine(row, sides) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-quadratics.of_form(self.across)).tolist()
         if not self.prismatic[2]:
-            third, doubt = quadratics.turn(
-                quadratics.total(across, *(quadratics.product(six, six) for six in g)), size, prefer[2]
-            )
+            squared = quadratics.total(across, *(quadratics.product(six, six) for six in g))
+            third, doubt = quadratics.turn(squared, size, prefer[2])
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4

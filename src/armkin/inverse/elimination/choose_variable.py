@@ -165,7 +165,8 @@ def _special_postures(closed: Loop, kind: Kind) -> Array:
         c, s = np.cos(q[0, :, 0]), np.sin(q[0, :, 0])
         up = np.where(rng.random(count) < 0.5, 1.0, -1.0)
         goal[:, :3, :3] = 0.0
-        goal[:, 0, 0], goal[:, 1, 0], goal[:, 0, 1], goal[:, 1, 1], goal[:, 2, 2] = c, s, -s * up, c * up, up
+        goal[:, 0, 0], goal[:, 1, 0], goal[:, 2, 2] = c, s, up
+        goal[:, 0, 1], goal[:, 1, 1] = -s * up, c * up
     else:
         along = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
         goal[:, :2, 3] = along * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)

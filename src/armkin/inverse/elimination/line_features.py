@@ -24,7 +24,9 @@ from armkin.formula.arrays import Array
 from armkin.model.rotation import joint_motion
 
 SIZE = 15  # features of a line
-_P, _L, _PP, _PL, _M, _W, _ONE = slice(0, 3), slice(3, 6), 6, 7, slice(8, 11), slice(11, 14), 14
+_P, _L = slice(0, 3), slice(3, 6)
+_M, _W = slice(8, 11), slice(11, 14)
+_PP, _PL, _ONE = 6, 7, 14
 
 Z_AXIS: Array = np.zeros(SIZE)
 """f(o, z): the features of a frame's own z axis (point 0, direction e3)."""

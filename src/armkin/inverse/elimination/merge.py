@@ -79,7 +79,8 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         examined = np.flatnonzero((distance < tol.EXAMINED) & keep[first] & keep[second])
         if examined.size == 0:
             continue
-        first, second, step, distance = first[examined], second[examined], step[examined], distance[examined]
+        first, second = first[examined], second[examined]
+        step, distance = step[examined], distance[examined]
         target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
         _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(tol.HALFWAY, 4 * np.maximum(residual[first], residual[second]))

@@ -113,9 +113,8 @@ def build_pencil(role: Role, arm: Array, prismatic: Bool, psi: float) -> Pencil:
     rows, mix = factors * (15 - cut.rank), None
     if rows > p and role.wide:  # each with one of the others: a quarter of the entries is not zero
         mix = np.eye(p, rows)
-        mix[:, p:] = np.random.default_rng(1).standard_normal((p, rows - p)) * (
-            np.arange(p)[:, None] % (rows - p) == np.arange(rows - p)
-        )
+        partner = np.arange(p)[:, None] % (rows - p) == np.arange(rows - p)
+        mix[:, p:] = np.random.default_rng(1).standard_normal((p, rows - p)) * partner
     elif rows > p:
         mix = np.linalg.qr(np.random.default_rng(1).standard_normal((rows, p)))[0].T
     return Pencil(role, psi, part, links, cut, left, right, columns, mix, K.real, K.imag, W)

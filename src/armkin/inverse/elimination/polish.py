@@ -136,9 +136,8 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        going = np.flatnonzero(
-            size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOWLY)
-        )
+        open_ = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOWLY)
+        going = np.flatnonzero(open_)
         if step == most or going.size == 0:
             break
         if going.size < active.size:

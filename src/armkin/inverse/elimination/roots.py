@@ -79,7 +79,8 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
     middle, defect = _middle_joints(pencil, x, u)
     finite = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
     if finite.size < pose.size:
-        pose, index, slant, parted = pose[finite], index[finite], slant[finite], parted[finite]
+        pose, index = pose[finite], index[finite]
+        slant, parted = slant[finite], parted[finite]
         middle, defect = middle[:, finite], defect[finite]
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
@@ -185,7 +186,7 @@ def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
 def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
     """The products v, (M, 4, 3) or (M, 4, 4), of the roots x (M,) and the pencil's eigenvectors (M, size)."""
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
-    a1, a2, y, low = u[:, :r], u[:, r : 2 * r], u[:, 2 * r : 2 * r + w], u[:, 2 * r + w :]
+    a1, a2, y, low = np.split(u, (r, 2 * r, 2 * r + w), axis=1)
     x = x[:, None]
     large = np.abs(x) > 1
     flat = np.where(large, y / np.where(large, x, 1.0), low)  # y = x w: take the safer one
@@ -223,10 +224,8 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     third_powers = _half_powers(k) if pencil.role.wide else np.stack([np.ones_like(k), np.cos(k), np.sin(k)], axis=1)
     inner = (v * third_powers[:, None, :]).sum(axis=2)
     # a product's square is 2 x 2: of the powers of either joint, and of (1, cos, sin)
-    along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2 / (
-        4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)
-    )
-    return value, np.maximum(1.0 - along, 0.0)
+    along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2
+    return value, np.maximum(1.0 - along / (4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)), 0.0)
 
 
 def _half_powers(q: Array) -> Array:

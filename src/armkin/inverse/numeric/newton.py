@@ -208,7 +208,8 @@ def lost_directions(arm: Arm, task: Task, q: Array, chosen: Bool, target: Array)
         inverse = nudged(np.linalg.inv, J)
         sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
         rows = bound < tol.FOLDED
-        k, b, r, J = k[rows], b[rows], r[rows], J[rows]
+        k, b = k[rows], b[rows]
+        r, J = r[rows], J[rows]
     weak = Linear(r, *np.linalg.svd(J))
     V[k, b], place[k, b] = weak.V, np.arange(len(k))
     sigma[k, b], nullity[k, b] = _smallest(arm, task, weak.S)

@@ -27,7 +27,8 @@ class _Ends:
     """
 
     def __init__(self, follower: Follower, row: Int, branch: Int, of_limits: bool) -> None:
-        self.follower, self.row, self.branch, self.of_limits = follower, row, branch, of_limits
+        self.follower, self.of_limits = follower, of_limits
+        self.row, self.branch = row, branch
 
     def room_at(self, ends: Int, value: Array) -> Array:
         """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
@@ -52,7 +53,8 @@ class _Ends:
         value, going = 0.5 * (lo + hi), np.arange(len(lo))
         over, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
         for k in range(HALVINGS):
-            low, high, a, b, c = lo[going], hi[going], at_lo[going], at_hi[going], at_last[going]
+            low, high = lo[going], hi[going]
+            a, b, c = at_lo[going], at_hi[going], at_last[going]
             with np.errstate(invalid="ignore", divide="ignore"):
                 across = low + (high - low) * a / (a - b)
                 along = low + (low - last[going]) * a / (c - a)
@@ -68,7 +70,8 @@ class _Ends:
                 break
             room = self.room_at(going, guess)
             left = ~(np.abs(room) < tol.NO_ROOM)
-            going, guess, inside, room = going[left], guess[left], inside[left], room[left]
+            going, guess = going[left], guess[left]
+            inside, room = inside[left], room[left]
             better = room > 0
             over[going] = inside & np.isnan(room)
             # the Illinois rule: the value of an end that has stayed twice is halved
@@ -140,9 +143,8 @@ def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Arra
         value[leaders] = ends.between(good[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
         rows = np.flatnonzero(~joined & np.isin(first, leaders))
         value[rows] = value[first[rows]]
-        q = follower.branches_at(
-            changes.row[rows], value[rows] + np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
-        )
+        back = np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
+        q = follower.branches_at(changes.row[rows], value[rows] + back)
         away, _, apart = nearest_other(q, changes.branch[rows])
         mine = q[np.arange(len(rows)), changes.branch[rows]]
         present = ~np.isnan(mine[:, 0])
@@ -188,11 +190,8 @@ def places_of(follower: Follower, shown: Summary) -> Places:
     if len(gone.row):
         far = np.where(ending[~to_end], merged[place], far)
     good, bad = np.concatenate([crossing.value(0, t), merged[lone]]), np.concatenate([far, short.value(0, t)])
-    rooms = (
-        np.concatenate([inside[~to_end], room[lone]]),
-        np.concatenate([outside[~to_end], shown.gone.room[lone]]),
-        np.full(len(row), np.nan),
-    )
+    at_good = np.concatenate([inside[~to_end], room[lone]])
+    rooms = at_good, np.concatenate([outside[~to_end], shown.gone.room[lone]]), np.full(len(row), np.nan)
     crossed = _Ends(follower, row, branch, True).between(good, bad, good, rooms)
     legal[~to_end] = crossed[: len(crossing.row)]
     return Places(merged, legal, short, (merged[lone], crossed[len(crossing.row) :]))

@@ -49,7 +49,8 @@ def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: flo
     """As `onto_curves`, of postures that stay in the cache."""
     arm, task, unit = follower.arm, follower.free.task, radian_or_reach(follower.arm)
     target = follower.target[row]
-    q, tangent, size, going = q.copy(), last.copy(), np.full(len(q), np.inf), np.arange(len(q))
+    q, tangent = q.copy(), last.copy()
+    size, going = np.full(len(q), np.inf), np.arange(len(q))
     for _ in range(NEWTON):
         if not len(going):
             break
@@ -99,6 +100,5 @@ class Ways(NamedTuple):
 
     def follow(self, follower: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
-        return (
-            newton.misses(follower.arm, follower.free.task, self.at(follower, 0.5), follower.target[row]) < tol.ROUGHLY
-        )
+        miss = newton.misses(follower.arm, follower.free.task, self.at(follower, 0.5), follower.target[row])
+        return miss < tol.ROUGHLY

@@ -142,7 +142,8 @@ class _Rows:
 
     def __init__(self, arm: Arm, joint: int, near: Array, stands: Bool) -> None:
         """near: (N, n); stands: (N,) it is within limits and solves its target."""
-        self.arm, self.joint, self.near, self.stands = arm, joint, near, stands
+        self.arm, self.joint = arm, joint
+        self.near, self.stands = near, stands
         self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
         self.parts: list[tuple[Int, Array, Array, Bool, Int]] = []
         self.added = 0  # targets

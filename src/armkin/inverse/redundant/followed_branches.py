@@ -83,10 +83,8 @@ def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     shown = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
     pieces, short = _all_pieces(follower, shown), shown.short
     if finer == 1:
-        near_enough = follower.arm.prismatic.any() | (
-            distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
-        )
-        lost = shown.lost & near_enough
+        within_reach = distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
+        lost = shown.lost & (follower.arm.prismatic.any() | within_reach)
         for more, asked_again in ((CLOSER, shown.hidden & ~lost), (FINER, lost)):
             again = np.flatnonzero(asked_again)
             at_once = max(SAMPLES // more, 1)
@@ -128,7 +126,8 @@ def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -
     low, centre, high = (value_at(t, runs.row, best + side) for side in (-1, 0, 1))
     a, b = np.full(len(centre), -np.pi), np.full(len(centre), np.pi)
     cut = np.flatnonzero(runs.length < K)
-    row, first, branch, middle = runs.row[cut], runs.first[cut], runs.branch[cut], centre[cut]
+    row, first, branch = runs.row[cut], runs.first[cut], runs.branch[cut]
+    middle = centre[cut]
     begin = ends[number_of(changes, row, (first - 1) % K, branch, K)]
     end = ends[number_of(changes, row, (first + runs.length[cut] - 1) % K, branch, K)]
     a[cut], b[cut] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)

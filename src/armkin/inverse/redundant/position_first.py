@@ -71,7 +71,8 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
         lists = [minima[np.argsort(~hits_nothing(arm, minima), kind="stable")] for minima in lists]
     B = max(map(len, lists), default=0)
     batch = empty_batch(len(goal), B, arm.n)
-    batch.q[...], batch.branch[...], batch.status[...], batch.complete[...] = np.nan, -1, Status.UNREACHABLE, False
+    batch.q[...], batch.branch[...] = np.nan, -1
+    batch.status[...], batch.complete[...] = Status.UNREACHABLE, False
     for row, branch, minima in zip(batch.q, batch.branch, lists, strict=True):
         row[: len(minima)], branch[: len(minima)] = minima, np.arange(len(minima))
     batch.valid[...] = batch.within[...] = batch.branch >= 0

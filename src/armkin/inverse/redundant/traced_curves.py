@@ -163,9 +163,8 @@ class _Curves:
         passed, going = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
         for _ in range(TRIES):
             begin, step = rows_of(current, going), h[going, None]
-            then = onto_curves(
-                follower, row[going], begin.q + step * begin.tangent * unit, begin.tangent, tol.SAME_SEED
-            )
+            ahead = begin.q + step * begin.tangent * unit
+            then = onto_curves(follower, row[going], ahead, begin.tangent, tol.SAME_SEED)
             way = Ways.between(follower, begin, then)
             aside = np.sqrt(((way.chord - step * begin.tangent) ** 2).sum(axis=1))
             good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(follower, row[going])

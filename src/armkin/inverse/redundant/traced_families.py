@@ -61,22 +61,19 @@ class Traced(NamedTuple):
     def of(cls, follower: Follower, chains: Chains) -> Traced:
         """Curves of some targets."""
         points, row, count, _ = chains
-        N, begin, P, after = len(follower.target), np.cumsum(count) - count, len(points.step), chains.after
+        N, begin, after = len(follower.target), np.cumsum(count) - count, chains.after
         branch = np.arange(len(row)) - np.searchsorted(row, row)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
         ways = Ways.between(follower, points, rows_of(points, after))
-        flags = np.zeros((2, N), bool)
-        curves = cls(
-            follower, points, ways, np.repeat(row, count), begin, count, after, curve, none(follower.arm.n), *flags
-        )
-        if not P:
+        pieces, flags = none(follower.arm.n), np.zeros((2, N), bool)
+        curves = cls(follower, points, ways, np.repeat(row, count), begin, count, after, curve, pieces, *flags)
+        if not len(points.step):
             return curves
         extent = np.zeros(N)
         np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(ways.chord), begin, axis=0).max(axis=1))
-        return curves._replace(
-            pieces=curves._nodes().of_curves(curves, row, branch), short=(extent > 0) & (extent < tol.REACH)
-        )
+        pieces = curves._nodes().of_curves(curves, row, branch)
+        return curves._replace(pieces=pieces, short=(extent > 0) & (extent < tol.REACH))
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """As `Turning.at`."""
@@ -157,11 +154,8 @@ class Traced(NamedTuple):
         size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
         bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
         for _ in range(TURNS if len(point) else 0):
-            step = np.clip(
-                -end.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf),
-                -tol.REACH * size,
-                tol.REACH * size,
-            )
+            step = -end.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf)
+            step = np.clip(step, -tol.REACH * size, tol.REACH * size)
             ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.follower.arm)
             after = onto_curves(self.follower, self.row[point], ahead, end.tangent)
             bend = np.where(step == 0.0, bend, (after.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))

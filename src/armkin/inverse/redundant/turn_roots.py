@@ -86,7 +86,8 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     for _ in range(HALVINGS):
         sizes, blur = np.abs(a), slack[index]
         open_ = np.flatnonzero(sizes[:, 0] <= sizes[:, 1:].sum(axis=1) + blur)
-        a, index, angle, sizes, blur = a[open_], index[open_], angle[open_], sizes[open_], blur[open_]
+        a, index, angle = a[open_], index[open_], angle[open_]
+        sizes, blur = sizes[open_], blur[open_]
         single = sizes[:, 1] > (sizes[:, 2:] * order[2:]).sum(axis=1) + TERMS * blur
         ends = a[:, ::2].sum(axis=1)[:, None] + a[:, 1::2].sum(axis=1)[:, None] * np.array([-1.0, 1.0])
         touches = (ends[:, 0] * ends[:, 1] <= 0.0) | (np.abs(ends).min(axis=1) <= blur)

@@ -91,9 +91,8 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
         # the loose candidates come first
         B = np.arange(loose.shape[1])
         column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
-        linked = linkages.settle(
-            subset, np.take_along_axis(q, column[:, None, :, None], axis=2), np.take_along_axis(loose, column, axis=1)
-        )
+        ordered = np.take_along_axis(q, column[:, None, :, None], axis=2)
+        linked = linkages.settle(subset, ordered, np.take_along_axis(loose, column, axis=1))
         if len(rows := np.flatnonzero(linked.known)):
             # postures of known self-motions, and the candidates that are not loose, by their labels
             whose, present = part[rows], ~np.isnan(linked.q[rows, :, 0])
@@ -121,7 +120,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
 
 def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
-    arm, task, target, near = goals.arm, goals.task, goals.target[rows], goals.near[rows]
+    arm, task, target, near = goals.of(rows)
     # whether a target is singular depends on the last digit: plain numbers give every batch the same
     outputs = as_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)

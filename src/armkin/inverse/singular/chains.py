@@ -35,7 +35,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     left = np.flatnonzero(open_ & (at.second > tol.HIGH))
     if not len(left):
         return inside, ended, ended & at.alone, at.joints
-    joints, least, most, alone = at.joints.copy(), at.least.copy(), at.most.copy(), at.alone.copy()
+    joints, alone = at.joints.copy(), at.alone.copy()
+    least, most = at.least.copy(), at.most.copy()
     curve, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
     start, ahead = leave_spans(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
     finished = np.isnan(start[:, 0])
@@ -43,7 +44,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     for count in range(1, LINKS + 1):
         if not len(going):
             break
-        row, last, way, rows = curve[going], start[going], ahead[going], np.arange(len(going))
+        row, rows = curve[going], np.arange(len(going))
+        last, way = start[going], ahead[going]
         link = stretch(arm, task, last, target[row], span[going])
         good = link.followed & (link.second > tol.HIGH)
         span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))

@@ -89,7 +89,8 @@ class _Groups:
 
     def __init__(self, goals: Goals, at: _Candidates, lost: newton.Lost, rests: Bool) -> None:
         """rests: (K, M) those that no push takes along a self-motion."""
-        self.goals, self.at, self.lost, self.rests = goals, at, lost, rests
+        self.goals, self.at = goals, at
+        self.lost, self.rests = lost, rests
         K, M, n = at.q.shape
         self.valid: Bool = np.asarray(at.size <= tol.SOLUTION)
         on_motion: Bool = np.asarray(at.sure.any(axis=2))
@@ -136,9 +137,8 @@ class _Groups:
         decided = weak & (self.place > 0) & ~self.moves
         doubtful = weak & ~(decided & self.known & (sigma >= tol.SOLUTION))  # may be on a self-motion
         alone = valid & np.where(sure, ~doubtful.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        decided &= ~np.asarray(
-            (weak & (self.moves | ~self.pushed)).any(axis=1) | (sure.any(axis=1) & doubtful.any(axis=1))
-        )[:, None]
+        undecided = (weak & (self.moves | ~self.pushed)).any(axis=1) | (sure.any(axis=1) & doubtful.any(axis=1))
+        decided &= ~np.asarray(undecided)[:, None]
         rows = np.flatnonzero(decided.any(axis=1))
         if len(rows):
             mine, certain = decided[rows], self.known[rows]
@@ -187,10 +187,8 @@ class _Groups:
         if unpushed.any():
             k, b = k[unpushed], b[unpushed]
             self.pushed[k, b] = True
-            lost = np.maximum(self.lost.nullity[k, b], 1)
-            motion = self_motions.self_motion(
-                self.goals.arm, self.goals.task, self.at.q[k, b], self.lost.V[k, b], lost, self.goals.target[k]
-            )
+            (arm, task, target, _), lost = self.goals, np.maximum(self.lost.nullity[k, b], 1)
+            motion = self_motions.self_motion(arm, task, self.at.q[k, b], self.lost.V[k, b], lost, target[k])
             self.moves[k, b], self.which[k, b] = motion
 
     def _compare(self, k: Int, b: Int) -> None:
@@ -299,13 +297,15 @@ class _Groups:
             k = np.flatnonzero(self.open.any(axis=1))
             self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
         arm, task, target, _ = self.goals
-        q, sigma, chosen, every = self.at.q, self.lost.sigma, self.chosen, np.arange(len(self.open))[:, None]
+        q, sigma = self.at.q, self.lost.sigma
+        chosen, every = self.chosen, np.arange(len(self.open))[:, None]
         # a root of high order may also lie beside a self-motion
         moving = np.asarray(self.curve.any(axis=2))
         beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
         if len(rows):
-            goals, postures, stay, curve = self.goals.of(rows), q[rows], chosen[rows], self.curve[rows]
+            goals, postures = self.goals.of(rows), q[rows]
+            stay, curve = chosen[rows], self.curve[rows]
             self_motions.drop_contained(goals, postures, sigma[rows], self.resting[rows], stay, curve)
             # where two directions are lost several manifolds may have a posture
             linked = (self.known & self.moves)[rows, :, None] & (~self.ended & (self.lost.nullity < 2))[rows, None]

@@ -53,7 +53,8 @@ class Curves:
     """
 
     def __init__(self, arm: Arm, task: Task, q: Array, joints: Bool, target: Array, ahead: Array) -> None:
-        self._arm, self._task, self._joints, self._target = arm, task, joints, target
+        self._arm, self._task = arm, task
+        self._joints, self._target = joints, target
         self._start, self._ahead, self._taken = q, ahead, np.zeros(len(q), int)
         self._pace = _longest_steps(_onto_curve(arm, task, q, joints, target)[2])
         self.at, self.going, self.closed = q.copy(), np.ones(len(q), bool), np.zeros(len(q), bool)
@@ -61,7 +62,8 @@ class Curves:
     def step(self) -> Step:
         """One step of all that are going; one that leads off its curve is not taken, and the next is half as long."""
         rows = np.flatnonzero(self.going)
-        arm, joints, last, pace = self._arm, self._joints[rows], self._ahead[rows], self._pace[rows]
+        arm, joints = self._arm, self._joints[rows]
+        last, pace = self._ahead[rows], self._pace[rows]
         start = self.at[rows] + pace[:, None] * last * radian_or_reach(arm)
         landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
         ahead = _next_directions(V, second, last)

@@ -95,9 +95,8 @@ def _motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, 
     """What the loose candidates solving (K, S, B) their targets move on; known: (K,) if it is all known."""
     arm, task, target, _ = goals
     base = np.take_along_axis(q, solving.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
-    moving: Bool = np.asarray(
-        ((np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME) & solving[..., None]).any(axis=1)
-    )
+    moved = np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME
+    moving: Bool = np.asarray((moved & solving[..., None]).any(axis=1))
     way = newton.difference(arm, q[:, 1], q[:, 0])
     even = ((np.abs(np.abs(way) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
@@ -130,11 +129,9 @@ def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Arra
 
 def _first_columns(arm: Arm, motions: _Motions, loose: Bool) -> tuple[Int, Bool]:
     """The first column (K, B) on the same self-motion as each; and whether all others are clearly apart (K,)."""
-    B = loose.shape[1]
-    held = _held_difference(
-        arm, motions.base[:, None], motions.base[:, :, None], motions.d[:, :, None], motions.line[:, :, None]
-    )  # (K, B, B)
-    alike = ((motions.d[:, :, None] != 0.0) == (motions.d[:, None] != 0.0)).all(axis=3)
+    B, base, d = loose.shape[1], motions.base, motions.d[:, :, None]
+    held = _held_difference(arm, base[:, None], base[:, :, None], d, motions.line[:, :, None])  # (K, B, B)
+    alike = ((d != 0.0) == (motions.d[:, None] != 0.0)).all(axis=3)
     sense = motions.d.prod(axis=2, where=motions.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
     pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)

@@ -248,7 +248,8 @@ def _nodes(
     bordered = np.zeros(inverse.shape)
     bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
     # what does not fall to half of the last step from one to the next leads to no curve, or to another one
-    on, going, before, most = np.zeros(M, bool), np.arange(M), np.zeros(M), span.copy()
+    on, going = np.zeros(M, bool), np.arange(M)
+    before, most = np.zeros(M), span.copy()
     for _ in range(ITERATIONS):
         at, goal = x[:, going], np.concatenate([target[going]] * NODES)
         r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)

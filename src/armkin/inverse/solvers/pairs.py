@@ -156,7 +156,8 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
     way, size = along.copy(), np.full(M, np.inf)
     active = np.arange(M)
     for _ in range(STEPS):
-        goal, m, u, w = target[active], middle[active], way[active], square[active]
+        goal, m = target[active], middle[active]
+        u, w = way[active], square[active]
         half = np.sqrt(np.maximum(np.abs(w), tol.PAIR_WAY**2))[:, None]
         ahead, behind, at_m = (newton.scaled(arm, task, m + side * half * u * unit, goal) for side in (1.0, -1.0, 0.0))
         bent = (ahead[0] + behind[0] - 2.0 * at_m[0]) / half**2
