@@ -143,7 +143,7 @@ ARM_SELDOM static double arm_value(const double *g, int step, double s, double *
 }
 
 /* Which joints move along a component whose ends are far enough apart, and how far the one that goes farthest does. */
-ARM_SELDOM static double arm_moving(arm_branch *out)
+ARM_SELDOM static double arm_mark_moves(arm_branch *out)
 {
     double widest = 0.0;
     int j;
@@ -177,7 +177,7 @@ ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
             out->least[j] = fmin(out->least[j], x), out->most[j] = fmax(out->most[j], x);
         }
     }
-    out->motion = arm_moving(out) >= @wide@;
+    out->motion = arm_mark_moves(out) >= @wide@;
     for (i = 0; i < @fine@; i++) {
         arm_value(g, 1, -ends[0] + i * (ends[0] + ends[1]) / (@fine@ - 1), rise + i);
         steepest = fabs(rise[i]) > fabs(steepest) ? rise[i] : steepest;
@@ -262,12 +262,12 @@ ARM_SELDOM static int arm_chained(const double *goal, const double *at, int coun
                 return 0;
         }
         if (!out->motion) {
-            out->motion = arm_moving(out) >= @wide@;
+            out->motion = arm_mark_moves(out) >= @wide@;
             out->partial = out->motion && !(ended[0] && ended[1]);
         }
     }
     if (!out->partial)
-        arm_moving(out);
+        arm_mark_moves(out);
     out->turns &= !out->motion;
     return ended[0] && ended[1];
 }
