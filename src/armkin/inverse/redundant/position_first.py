@@ -44,9 +44,7 @@ Ik = Callable[..., Solutions]
 def check_arm(arm: Arm, task: str | None) -> None:
     """Raise UsageError where position first is not for this arm or task."""
     if task != "pose":
-        raise UsageError(
-            f"position first is for task pose, not {task or 'the default one'}", task=task, needs="task pose"
-        )
+        raise UsageError(f"position first is for task pose, not {task or 'the default'}", task=task, needs="task pose")
     if arm.n not in (4, 5):
         raise UsageError(f"position first is for arms of 4 or 5 joints; {arm.name} has {arm.n}", joints=arm.n)
 

@@ -87,21 +87,24 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     size = np.abs(way).max(axis=1)
     close = size < tol.CLOSE_BY
     partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
-    decided[k[partners > 1]] = decided[k[i[size < APART]]] = False
+    decided[k[partners > 1]] = False
     if not decided[k].all():  # no Jacobians of those
         return _second_of_pairs(goals, doubted, near_roots, decided)
-    i, j, way = i[close], j[close], way[close]
+    i, j, way, double = i[close], j[close], way[close], size[close] < APART
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
+    partners[i[double]], weak[i[double]] = 0, True  # of double roots the first stands for both
     lone = np.flatnonzero(weak & (partners == 0) & decided[k])
     if len(lone):
-        decided[k[lone[~_isolated(goals, q[lone], inverse[lone], beside[lone])]]] = False
+        isolated, turns = _by_curvature(goals, q[lone], inverse[lone], beside[lone])
+        decided[k[lone[~np.where(np.isin(lone, i[double]), turns, isolated)]]] = False
+        second[k[j[double]], b[j[double]]] = True
+        i, j, way = i[~double], j[~double], way[~double]
     if len(i):
         ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
         alone, meet = _cubic(way, inverse[i], ends)
         decided[k[i[~(alone | meet)]]] = False
-        j = j[meet]
-        second[k[j], b[j]] = True
+        second[k[j[meet]], b[j[meet]]] = True
     return second
 
 
@@ -148,9 +151,9 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
     return np.asarray(alone), np.asarray(meet)
 
 
-def _isolated(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
-    """Which weak postures (M, n), with no other close by, are isolated roots: g is too steep to turn before it passes
-    `SOLUTION`."""
+def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tuple[Bool, Bool]:
+    """Which weak postures (M, n), with no other close by, are isolated roots: g passes `SOLUTION` before it turns,
+    and which are boundaries: it turns before."""
     n = q.shape[1]
     # the columns of J^-1 are nearly along the lost direction v, the longest one most of all
     moved = inverse[:, :n]
@@ -167,7 +170,10 @@ def _isolated(goals: Goals, q: Array, inverse: Array, beside: Array) -> Bool:
         ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
         bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
         steep = slope**2 > SURELY * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
-    return np.asarray(_one_direction_lost(inverse, lost) & (passed < tol.FOLD_WAY) & steep)
+        end = 4.0 * np.sqrt(tol.SOLUTION / bend)
+        flat = SURELY * slope**2 < 2.0 * tol.SOLUTION * (bend - tol.CURVATURE * end)
+    one, square = _one_direction_lost(inverse, lost), beside.shape[2] == 0
+    return np.asarray(one & (passed < tol.FOLD_WAY) & steep), np.asarray(one & (end < tol.FOLD_WAY) & flat & square)
 
 
 def _tangents(v: Array, inverse: Array) -> Array:
