@@ -84,13 +84,13 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     row, i, j = np.nonzero(np.triu(near_roots[:, :, None] & near_roots[:, None], 1))
     i, j = number[row, i], number[row, j]
     way = newton.difference(goals.arm, q[j], q[i])
-    size = np.abs(way).max(axis=1)
-    close = size < tol.CLOSE_BY
+    close = np.abs(way).max(axis=1) < tol.CLOSE_BY
     partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
     decided[k[partners > 1]] = False
     if not decided[k].all():  # no Jacobians of those
         return _second_of_pairs(goals, doubted, near_roots, decided)
-    i, j, way, double = i[close], j[close], way[close], size[close] < APART
+    i, j, way = i[close], j[close], way[close]
+    double = np.abs(way).max(axis=1) < APART
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
     partners[i[double]], weak[i[double]] = 0, True  # of double roots the first stands for both
