@@ -44,7 +44,7 @@ def check_gripper(plan: PathPlan, board: Board) -> None:
     """Raise UsageError if the plan needs a gripper that the board does not move, or a value it cannot reach."""
     for marker in plan.markers:
         if marker.kind == "grip":
-            board.grip_value(marker.value)
+            board.check_grip(marker.value)
 
 
 def check_pauses(plan: PathPlan, answers: bool) -> None:

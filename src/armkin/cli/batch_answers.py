@@ -109,12 +109,12 @@ def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
 
 def _table_encoder(job: Job) -> Callable[[Table], bytes]:
     """What makes bytes of a table."""
-    format = format_of(f"x{job.format}")
-    if not (job.compiled and format.is_text):
-        return format.encoded
+    file_format = format_of(f"x{job.format}")
+    if not (job.compiled and file_format.is_text):
+        return file_format.encoded
     from armkin.compiled.table_lines import table_lines
 
-    return partial(format.encoded, lines=table_lines)
+    return partial(file_format.encoded, lines=table_lines)
 
 
 def answer_piece(job: Job, piece: Piece) -> Done:
@@ -161,7 +161,7 @@ def _count_bad_rows(tally: Tally, chunk: Chunk, good: Any) -> None:
 
 
 @dataclass
-class Batch:
+class BatchRun:
     """A batch of questions and where its answers go."""
 
     questions: Questions
@@ -185,29 +185,30 @@ class Batch:
     def run(self, pieces: Rows) -> Tally:
         """Answer all pieces."""
         to_file = self.out is not None and self.out != "-"
-        format = format_of(self.out if to_file else None)
-        if self.as_json and (not format.is_text or str(self.out).lower().endswith(".csv")):
+        file_format = format_of(self.out if to_file else None)
+        if self.as_json and (not file_format.is_text or str(self.out).lower().endswith(".csv")):
             raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away, or end the name with .jsonl")
         if self.resume and not to_file:
             raise UsageError("--resume goes on with --out FILE; give the file")
-        job = Job(self.questions, self.as_json, "" if format.name == "csv" else f".{format.name}", self.compiled)
+        ending = "" if file_format.name == "csv" else f".{file_format.name}"
+        job = Job(self.questions, self.as_json, ending, self.compiled)
         tally = Tally()
         if to_file and _is_file(str(self.out)):
-            _ToFile(self, format, job, tally, pieces.size).run(pieces)
+            _ToFile(self, file_format, job, tally, pieces.size).run(pieces)
         else:
-            self._stream(format, job, pieces, tally)
+            self._stream(file_format, job, pieces, tally)
         if tally.skipped:
             names = ",".join(pieces.names)
             output.warn(f"{tally.skipped} row{'s' * (tally.skipped > 1)} without {names} skipped")
         return tally
 
-    def _stream(self, format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
+    def _stream(self, file_format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
         """To a pipe, piece by piece; what is no text when all is there."""
         binary_parts: list[bytes] = []
         with _binary_writer(self.out) as write, output.progress("rows", pieces.count) as tick:
             for finished in in_order(self.engine, answer_piece, job, pieces):
-                if format.is_text:
-                    write(_heading_bytes(finished, job, format, tally) + finished.data)
+                if file_format.is_text:
+                    write(_heading_bytes(finished, job, file_format, tally) + finished.data)
                 elif finished.tally.rows:
                     binary_parts.append(finished.data)
                 tally.add(finished.tally)
@@ -218,13 +219,13 @@ class Batch:
                 raise pieces.empty(tally.skipped)
             if binary_parts:
                 joined = io.BytesIO()
-                format.write_parts(joined, lambda: map(io.BytesIO, binary_parts))
+                file_format.write_parts(joined, lambda: map(io.BytesIO, binary_parts))
                 write(joined.getvalue())
 
 
-def _heading_bytes(finished: Done, job: Job, format: Format, tally: Tally) -> bytes:
+def _heading_bytes(finished: Done, job: Job, file_format: Format, tally: Tally) -> bytes:
     """The heading of a CSV, before its first rows."""
-    first = format.name == "csv" and not job.as_json and finished.tally.rows and not tally.rows
+    first = file_format.name == "csv" and not job.as_json and finished.tally.rows and not tally.rows
     return (csv_line(finished.heading) + "\n").encode() if first else b""
 
 
@@ -247,12 +248,12 @@ def _binary_writer(out: str | None) -> Iterator[Callable[[bytes], object]]:
 class _ToFile:
     """A batch whose answers become a file: more than one piece keep their answers beside it until all are there."""
 
-    def __init__(self, batch: Batch, format: Format, job: Job, tally: Tally, size: int | None) -> None:
-        self.batch, self.format = batch, format
+    def __init__(self, batch: BatchRun, file_format: Format, job: Job, tally: Tally, size: int | None) -> None:
+        self.batch, self.format = batch, file_format
         self.job, self.tally = job, tally
         self.path = str(batch.out)
         files.check_writable(self.path)
-        identity = {"armkin": __version__, "format": format.name, "json": batch.as_json, "input size": size}
+        identity = {"armkin": __version__, "format": file_format.name, "json": batch.as_json, "input size": size}
         self.parts = Parts(self.path, {**batch.settings, **identity})
         self.first: Done | None = None  # the only piece so far: it may be the last
         self.count = 0

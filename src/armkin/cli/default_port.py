@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
 
 
-def port_option(help: str) -> Any:
+def port_option(help_text: str) -> Any:
     """`--port`, for commands that take another help than `PortName`'s."""
     return typer.Option(
         "--port",
@@ -23,7 +23,7 @@ def port_option(help: str) -> Any:
         envvar="ARMKIN_PORT",
         show_envvar=False,
         autocompletion=completion.ports,
-        help=help,
+        help=help_text,
     )
 
 

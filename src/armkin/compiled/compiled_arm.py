@@ -43,7 +43,7 @@ BLOCK = 16384  # poses of an elimination whose results are kept in all columns
 UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
 
 
-def compile(arm: Arm, task: str | None = None) -> CompiledArm:
+def compile(arm: Arm, task: str | None = None) -> CompiledArm:  # noqa: A001 - `armkin.compile`
     """An arm whose `fk` and `ik` run as machine code, built now by the system's C compiler and kept for later.
 
     The results are those of `armkin.fk` and `armkin.ik`, to rounding; targets on an edge that C does not tell (singular

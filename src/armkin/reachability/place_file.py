@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
     """All places as a file of columns: .npz, .parquet, .jsonl or .csv; parts of an unfinished run go."""
     path = os.fspath(out)
-    format = format_of(path)
+    file_format = format_of(path)
     table = place_columns(places)
     with files.write_whole(path, "wb") as file:
-        if format.name == "csv":
+        if file_format.name == "csv":
             file.write((csv_line(list(table)) + "\n").encode())
-        format.write_parts(file, lambda: [io.BytesIO(format.encoded(table))])
+        file_format.write_parts(file, lambda: [io.BytesIO(file_format.encoded(table))])
     Parts(path, {}).remove()
 
 

@@ -182,7 +182,7 @@ def answer_chunk(question: Question, chunk: Chunk) -> tuple[int, Table]:
     ring = np.repeat(chunk.rings, M, axis=0)
     p = grid.positions(ring, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
     table: Table = {f"{name}_mm": np.ascontiguousarray(p[:, i]) + 0.0 for i, name in enumerate("xyz")}
-    for name in list(UNITS)[3:]:
+    for name in [name for name in UNITS if name not in table]:
         table[name] = np.concatenate([part[name] for part in parts]) if name in parts[0] else np.full(cells, np.nan)
     return chunk.number, table
 
@@ -236,17 +236,19 @@ class _Run:
     def _write(self, count: int, kept_tables: dict[int, Table]) -> None:
         assert self.out is not None
         assert self.parts is not None
-        format, parts = format_of(self.out), self.parts
+        file_format, parts = format_of(self.out), self.parts
+
+        is_npz = file_format.name == "npz"
 
         def tables() -> Iterator[Any]:
             for number in range(count):
                 encoded = parts.read(number) if parts.is_held else npz.encode_table(kept_tables[number])
-                yield io.BytesIO(encoded if format.name == "npz" else format.encoded(npz.decode_table(encoded)))
+                yield io.BytesIO(encoded if is_npz else file_format.encoded(npz.decode_table(encoded)))
 
         with write_whole(self.out, "wb") as file:
-            if format.name == "csv":
+            if file_format.name == "csv":
                 file.write((",".join(UNITS) + "\n").encode())
-            format.write_parts(file, tables)
+            file_format.write_parts(file, tables)
         if parts.is_held:
             parts.remove()
 

@@ -66,8 +66,8 @@ class _Reader:
         if self.depth > MAX_DEPTH:
             raise RobotFileError(f"{self.name}: elements nested deeper than {MAX_DEPTH}; a URDF has about 5")
         if self.depth == 1 and tag != "robot":
-            format = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
-            raise RobotFileError(f"{self.name}: is not a URDF but {format}; a URDF begins with <robot name=...>")
+            other_format = _FORMATS.get(tag, f"its outermost element is <{tag[:40]}>")
+            raise RobotFileError(f"{self.name}: is not a URDF but {other_format}; a URDF begins with <robot name=...>")
 
     def _add_named(self, tag: str, attributes: Mapping[str, str]) -> None:
         name = attributes.get("name")

@@ -74,9 +74,9 @@ class Actions:
         return self.for_control[name](tab, fields)
 
     def _solver(self) -> dict[str, Any]:
-        from armkin.teach.browser_solver import own_solver
+        from armkin.teach.browser_solver import solver_fields
 
-        return own_solver(self.arm)
+        return solver_fields(self.arm)
 
     def _reach(self) -> dict[str, Any]:
         from armkin.teach.reach_slice import reach_slice

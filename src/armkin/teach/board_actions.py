@@ -177,7 +177,7 @@ class BoardActions:
             raise UsageError("value: expected open, closed or a number")
         target = value if isinstance(value, str) else request_checks.number_field(fields, "value", -1e6, 1e6)
         board = self.thread.board
-        board.grip_value(target)
+        board.check_grip(target)
         assume = request_checks.flag_field(fields, "assume")
         self.check_file()
         self.thread.submit("grip", lambda machine: _move_gripper(self.thread.board, target, assume))

@@ -31,7 +31,7 @@ def solver_json(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
     }
 
 
-def own_solver(arm: Arm) -> dict[str, Any]:
+def solver_fields(arm: Arm) -> dict[str, Any]:
     """The module's text and `about`; none where the arm has no module."""
     from armkin.export.js.es_module import module_text  # only pages that are open need it
 

@@ -202,7 +202,7 @@ class _Handler(BaseHTTPRequestHandler):
         """What the Server header says."""
         return "armkin"
 
-    def log_message(self, format: str, *args: Any) -> None:
+    def log_message(self, *_: Any) -> None:
         """Requests are not printed."""
 
 

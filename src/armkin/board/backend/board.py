@@ -272,6 +272,10 @@ class Board(ABC):
             raise UsageError(f"grip: {target:g} is outside of the gripper's {low:g} to {high:g}")
         return target
 
+    def check_grip(self, value: str | float) -> None:
+        """Raise UsageError if the arm has no gripper, or it cannot go there."""
+        self.grip_value(value)
+
     def grip_known(self) -> bool:
         """Whether the gripper may be moved without somebody's word for where it stands."""
         return True

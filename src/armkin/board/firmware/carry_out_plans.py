@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from armkin.board.firmware.segments.remaining_plan import left_of
 from armkin.board.firmware.streaming import LEAD_BAD, LEAD_MOST, motion_batches, ramp_pieces, seconds_of, stream_frames
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.motion_frame import Batch
+from armkin.board.firmware.wire.motion_frame import MotionFrame
 from armkin.board.firmware.wire.protocol import Error, Status
 from armkin.board.firmware.wire.reply_checks import DeviceError
 
@@ -108,7 +108,7 @@ class _Run:
         self.under_way = _UnderWay()
         self._begun = self._total = seconds
 
-    def frames(self, plans: Iterable[Cut | None], least: float) -> Iterator[Batch | None]:
+    def frames(self, plans: Iterable[Cut | None], least: float) -> Iterator[MotionFrame | None]:
         """The frames of plans, None where there is no plan yet; least: [s] that the arm stands before its first."""
         frame_count = 0
         for plan in plans:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.go_back_n import QUESTION
-from armkin.board.firmware.wire.motion_frame import Batch, motion_size
+from armkin.board.firmware.wire.motion_frame import MotionFrame, motion_size
 from armkin.board.firmware.wire.protocol import Segment, State, Status
 
 if TYPE_CHECKING:
@@ -39,21 +39,23 @@ _BETWEEN = 2.2  # factor on these times between ticks
 _ACK = 16  # size [bytes] of an answer
 
 
-def stream_frames(session: Session, frames: Iterator[Batch | None], report_left: Callable[[float], None]) -> Status:
+def stream_frames(
+    session: Session, frames: Iterator[MotionFrame | None], report_left: Callable[[float], None]
+) -> Status:
     """Send frames until there are no more and the arm stands; report_left: told the seconds of motion to come."""
     more, at_rest = True, False  # whether what was submitted ends at rest
-    held: Batch | object | None = None  # the beginning of the next move
+    held: MotionFrame | object | None = None  # the beginning of the next move
     while more or session.pending[0]:
         while more and session.pending[0] < 2:
             batch, held = (held or next(frames, _DONE)), None
-            if isinstance(batch, Batch) and at_rest and not _may_follow_rest(session, batch):
+            if isinstance(batch, MotionFrame) and at_rest and not _may_follow_rest(session, batch):
                 held = batch
                 break
             if batch is _DONE:
                 more = False
             if batch is None or not more:
                 break
-            assert isinstance(batch, Batch)
+            assert isinstance(batch, MotionFrame)
             session.submit(batch.payload, len(batch.segments), batch.seconds)
             at_rest = batch.at_rest
         session.pump()
@@ -74,7 +76,7 @@ def _status_at_rest(session: Session) -> Status:
 _DONE = object()
 
 
-def _may_follow_rest(session: Session, batch: Batch) -> bool:
+def _may_follow_rest(session: Session, batch: MotionFrame) -> bool:
     """Whether the queue may go on behind a rest with the beginning of the next move.
 
     All the way down to the rest the queue holds just the time to a stop and what follows the rest: a short beginning
@@ -166,7 +168,7 @@ def _seconds_queued(session: Session) -> float:
 
 def motion_batches(
     session: Session, move: Move, axes: Sequence[int], clock: int, least: float = 0.0
-) -> Iterator[Batch]:
+) -> Iterator[MotionFrame]:
     """A move's segments in frames: as many as a good line takes, fewer on a bad one; least: see `lead_time`.
 
     Two frames may be on their way: the second one fits what the board keeps while it is busy with the first.
@@ -192,7 +194,7 @@ def motion_batches(
             segments = list(islice(source, 1))
         places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
         end = [p // protocol.STEP for p in places]
-        yield Batch([axes[k] for k in moving], begin_counts, end, part, not segments, clock, move.brake)
+        yield MotionFrame([axes[k] for k in moving], begin_counts, end, part, not segments, clock, move.brake)
         begin_counts = end
 
 

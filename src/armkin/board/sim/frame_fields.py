@@ -20,7 +20,7 @@ class RefusedError(Exception):
 
 
 @dataclass(frozen=True)
-class Batch:
+class MotionFields:
     """A MOTION frame's fields."""
 
     axes: list[int]
@@ -31,7 +31,7 @@ class Batch:
     brake: float  # share of the accelerations that a hold takes
 
 
-def read_batch(payload: bytes) -> Batch:
+def read_batch(payload: bytes) -> MotionFields:
     """A MOTION frame's fields; its length must follow from them exactly."""
     if len(payload) < 6:
         raise RefusedError(Error.LENGTH)
@@ -46,7 +46,7 @@ def read_batch(payload: bytes) -> Batch:
     ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
     pieces = (payload[offset : offset + size] for offset in range(6 + 8 * k, len(payload), size))
     segments = [protocol.read_segment(piece, axes, wide=wide) for piece in pieces]
-    return Batch(
+    return MotionFields(
         axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END), 1 - gentle / protocol.GENTLE_PARTS
     )
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
 from armkin.board.sim.axis_counts import limit_rule_holds
 from armkin.board.sim.coupled_limits import Rows
-from armkin.board.sim.frame_fields import Batch, RefusedError
+from armkin.board.sim.frame_fields import MotionFields, RefusedError
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.rate_checks import Velocity, times_valid
 from armkin.board.sim.segment_queue import Queue
@@ -25,7 +25,7 @@ class Batches:
         self._velocity = Velocity(self._setup.board, self._setup.image)
         self._rows = Rows(self._setup.image, self._queue.plan_counts())
 
-    def check(self, batch: Batch, known_axes: int) -> list[Segment]:
+    def check(self, batch: MotionFields, known_axes: int) -> list[Segment]:
         """The batch's segments with a rate for every axis; RefusedError if one of them must not run."""
         plan, speed = list(self._queue.plan), self._velocity.copy()
         segments = [

@@ -61,7 +61,7 @@ def fk(
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"], answer)
             return
-    from armkin.cli.batch_answers import Batch as Run
+    from armkin.cli.batch_answers import BatchRun
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
@@ -73,12 +73,12 @@ def fk(
         "frames": frames,
         "compiled": compiled,
     }
-    questions = Questions(arm, frames, compiled)
-    Run(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
+    questions = FkQuestions(arm, frames, compiled)
+    BatchRun(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)
-class Questions:
+class FkQuestions:
     """What is asked of each row of a batch."""
 
     arm: Arm

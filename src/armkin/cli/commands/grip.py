@@ -65,17 +65,18 @@ def _rest_text(gripped: Gripped) -> str:
         return f"{text} ({gripped.counts} {gripped.count_unit})"
     if not gripped.measured:
         return f"{text}, as sent: nothing measures it"
-    held = abs(gripped.position - gripped.target) >= 1.5
-    return text + f" of {render.short_text(gripped.target)}: it holds something, or is blocked" * held
+    if abs(gripped.position - gripped.target) < 1.5:
+        return text
+    return f"{text} of {render.short_text(gripped.target)}: it holds something, or is blocked"
 
 
 def _gripper_value(board: Board, text: str, option: str) -> str | float:
     """A gripper's value: open, closed, or a number within them. Raises UsageError for others."""
-    board.grip_value("open")  # is there a gripper?
+    board.check_grip("open")
     if text in _WORD:
         return _WORD[text]
     if not is_number(text) and (close := get_close_matches(text.lower(), _WORD, 1)):
         raise UsageError(f"{option}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
     value = number(text, option)
-    board.grip_value(value)
+    board.check_grip(value)
     return value

@@ -104,15 +104,15 @@ def ik(
         position_first=position_first,
     )
     request = _request_with_solver(request, chosen_task.name, compiled=compiled)
-    questions = Questions(request, chosen_task, all_branches, turns, continuous)
+    questions = IkQuestions(request, chosen_task, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
-        from armkin.cli.batch_answers import Batch as Run
+        from armkin.cli.batch_answers import BatchRun
         from armkin.cli.batch_pieces import Rows
 
         arguments.no_numbers(target)
         rows = Rows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
-        Run(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
+        BatchRun(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     arguments.one_alone(workers, cluster, resume)
     if reached is None:
@@ -148,7 +148,7 @@ def _check_together(
 
 
 def _single_target(
-    questions: Questions, values: Array, words: list[list[int]] | None, out: str | None, *, json: bool
+    questions: IkQuestions, values: Array, words: list[list[int]] | None, out: str | None, *, json: bool
 ) -> None:
     """Print the answer of one target (1, m) [mm, deg], then raise why it has no branch, if it has none.
 
@@ -185,7 +185,7 @@ def _decimal_rounding(arm: Arm, task: Task, values: Array, decimals: list[list[i
 
 
 @dataclass
-class Questions:
+class IkQuestions:
     """What is asked of each row of a batch; continuous: each is compared with the one before."""
 
     request: choose_branch.Request

@@ -62,17 +62,17 @@ def pulses(
         for name in answer["outside_travel"]:
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
-    from armkin.cli.batch_answers import Batch as Run
+    from armkin.cli.batch_answers import BatchRun
     from armkin.cli.batch_pieces import Rows
 
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
-    questions = Questions(arm, origin, best)
-    Run(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
+    questions = PulseQuestions(arm, origin, best)
+    BatchRun(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)
-class Questions:
+class PulseQuestions:
     """What is asked of each row of a batch."""
 
     arm: Arm

@@ -24,7 +24,7 @@ def teach(
     no_scene: NoScene = False,
     baud: Baud = None,
     meshes: Meshes = None,
-    open: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+    open_page: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
     """A page in the browser: see the arm, choose a branch, send it.
 
@@ -51,7 +51,7 @@ def teach(
                 write(f"{server.address}\n")
             output.note("Ctrl-C ends it" + (", after the arm has been stopped" if port is not None else ""))
             threading.Thread(target=actions.warm, daemon=True).start()
-            if open:
+            if open_page:
                 import webbrowser
 
                 webbrowser.open(stack.enter_context(redirection(server.address)))

@@ -48,7 +48,7 @@ def motion_size(axes: int, segments: Sequence[Segment]) -> int:
 
 
 @dataclass(frozen=True)
-class Batch:
+class MotionFrame:
     """Segments of some axes, from counts to counts."""
 
     axes: list[int]
