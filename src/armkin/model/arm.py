@@ -146,15 +146,15 @@ def actual_arm(arm: Arm) -> Arm:
         return arm
     return replace(
         arm,
-        lower=_freeze(arm.lower * r),
-        upper=_freeze(arm.upper * r),
-        home=_freeze(arm.home * r),
-        pose_joints=_freeze(arm.pose_joints * r),
-        max_speed=_freeze(arm.max_speed * r),
-        max_accel=_freeze(arm.max_accel * r),
-        max_jerk=_freeze(arm.max_jerk * r),
-        ratio=_freeze(np.ones(arm.n)),
-        motor_gain=_freeze(arm.motor_gain / r),
+        lower=freeze(arm.lower * r),
+        upper=freeze(arm.upper * r),
+        home=freeze(arm.home * r),
+        pose_joints=freeze(arm.pose_joints * r),
+        max_speed=freeze(arm.max_speed * r),
+        max_accel=freeze(arm.max_accel * r),
+        max_jerk=freeze(arm.max_jerk * r),
+        ratio=freeze(np.ones(arm.n)),
+        motor_gain=freeze(arm.motor_gain / r),
     )
 
 
@@ -163,67 +163,56 @@ def from_links(
     prismatic: Sequence[bool] | NDArray[np.bool_],
     *,
     name: str = "arm",
-    joint_names: tuple[str, ...] = (),
-    frame: ArrayLike | None = None,
-    base: ArrayLike | None = None,
     limits: ArrayLike | None = None,
-    home: ArrayLike | None = None,
     max_speed: ArrayLike | None = None,
     max_accel: ArrayLike | None = None,
-    max_jerk: ArrayLike | None = None,
-    dh_sign: ArrayLike | None = None,
-    dh_theta: ArrayLike | None = None,
     ratio: ArrayLike | None = None,
-    pitch_offset: float = 0.0,
     task: str | None = None,
     motor_gain: ArrayLike | None = None,
-    motor_bias: ArrayLike | None = None,
-    poses: Mapping[str, ArrayLike] | None = None,
-    **rest: Any,
 ) -> Arm:
-    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the rest optional.
+    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the others as `Arm` has them.
 
-    rest: what is no array: motors, homing, hard_limits, gripper, board, path, sha256, description, source, file.
+    All else is as of an arm without a robot file: joints q1, q2, ... that are 0 at home, no poses, no board.
     """
     n = len(prismatic)
-    links = _freeze(link)
+    links = freeze(link)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
     gain = _as_array(motor_gain, np.zeros((0, n)))
     sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
     return Arm(
         name=name,
-        joint_names=joint_names or tuple(f"q{i + 1}" for i in range(n)),
-        prismatic=_freeze(prismatic, bool),
+        joint_names=tuple(f"q{i + 1}" for i in range(n)),
+        prismatic=freeze(prismatic, bool),
         link=links,
-        frame=_as_array(frame, np.broadcast_to(np.eye(4), (n, 4, 4))),
-        base=_as_array(base, np.eye(4)),
-        lower=_freeze(span[:, 0]),
-        upper=_freeze(span[:, 1]),
-        home=_as_array(home, np.zeros(n)),
+        frame=freeze(np.broadcast_to(np.eye(4), (n, 4, 4))),
+        base=freeze(np.eye(4)),
+        lower=freeze(span[:, 0]),
+        upper=freeze(span[:, 1]),
+        home=freeze(np.zeros(n)),
         max_speed=_as_array(max_speed, np.full(n, math.nan)),
         max_accel=_as_array(max_accel, np.full(n, math.nan)),
-        max_jerk=_as_array(max_jerk, np.full(n, math.nan)),
-        dh_sign=_as_array(dh_sign, np.ones(n)),
-        dh_theta=_as_array(dh_theta, np.zeros(n)),
+        max_jerk=freeze(np.full(n, math.nan)),
+        dh_sign=freeze(np.ones(n)),
+        dh_theta=freeze(np.zeros(n)),
         ratio=_as_array(ratio, np.ones(n)),
-        pitch_offset=pitch_offset,
+        pitch_offset=0.0,
         task=task,
         motor_gain=gain,
-        motor_bias=_as_array(motor_bias, np.zeros(len(gain))),
+        motor_bias=freeze(np.zeros(len(gain))),
         reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
-        pose_names=tuple(poses or ()),
-        pose_joints=_freeze(np.array(list((poses or {}).values()), dtype=float).reshape(-1, n)),
-        homing=rest.pop("homing", (None,) * n),
-        hard_limits=rest.pop("hard_limits", (False,) * n),
-        **rest,
+        pose_names=(),
+        pose_joints=freeze(np.zeros((0, n))),
+        homing=(None,) * n,
+        hard_limits=(False,) * n,
     )
 
 
 def _as_array(values: ArrayLike | None, default: Array) -> Array:
-    return _freeze(default if values is None else values)
+    return freeze(default if values is None else values)
 
 
-def _freeze(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+def freeze(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
+    """A copy that cannot be written to: caches hold code for an arm's values."""
     array: NDArray[Any] = np.array(values, dtype=dtype)
     array.flags.writeable = False
     return array

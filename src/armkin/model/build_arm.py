@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.model.arm import Arm, from_links
+from armkin.model.arm import Arm, freeze, from_links
 from armkin.model.rotation import FLIP, cos_sin_deg, inverse, transform
 
 if TYPE_CHECKING:
@@ -38,19 +39,27 @@ def arm_of_file(file: RobotFile, scene: Scene | None = None, tool: Sequence[floa
     base = transform(file.base.xyz, file.base.rpy)
     link, frame = _chain(file, base)
     unit = np.array([1.0 if j.type == "prismatic" else math.pi / 180 for j in file.joints])
+    limits = [(-math.inf, math.inf) if j.limits is None else j.limits for j in file.joints] * unit[:, None]
     gain, bias = _motor_gain_and_bias(file, unit)
-    return from_links(
+    chain = from_links(
         link,
         [j.type == "prismatic" for j in file.joints],
         name=file.name,
-        frame=frame,
-        base=base,
-        **_joint_fields(file.joints, unit),
-        pitch_offset=math.radians(file.pitch_offset),
+        limits=limits,
+        ratio=[j.ratio for j in file.joints],
         task=file.task,
         motor_gain=gain,
-        motor_bias=bias,
-        poses={name: np.array(values) * unit for name, values in (file.poses or {}).items()},
+    )
+    poses = np.array(list((file.poses or {}).values()), dtype=float).reshape(-1, chain.n)
+    return replace(
+        chain,
+        **_joint_fields(file.joints, unit),
+        frame=freeze(frame),
+        base=freeze(base),
+        pitch_offset=math.radians(file.pitch_offset),
+        motor_bias=freeze(bias),
+        pose_names=tuple(file.poses or ()),
+        pose_joints=freeze(poses * unit),
         motors=file.motor_list(),
         **_keep_outs(file, scene),
         tool=None if tool is None else tuple(map(float, tool)),
@@ -65,17 +74,15 @@ def arm_of_file(file: RobotFile, scene: Scene | None = None, tool: Sequence[floa
 
 
 def _joint_fields(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
-    """The arm's fields that have an entry for each joint; unit: (n,) rad | mm of the file's degree | mm."""
+    """The arm's other fields that have an entry for each joint; unit: (n,) rad | mm of the file's degree | mm."""
     return {
         "joint_names": tuple(j.name for j in joints),
-        "limits": [(-math.inf, math.inf) if j.limits is None else j.limits for j in joints] * unit[:, None],
-        "home": np.array([j.home for j in joints]) * unit,
-        "max_speed": _numbers_or_nan(j.max_speed for j in joints) * unit,
-        "max_accel": _numbers_or_nan(j.max_accel for j in joints) * unit,
-        "max_jerk": _numbers_or_nan(j.max_jerk for j in joints) * unit,
-        "dh_sign": [float(j.sign) for j in joints],
-        "dh_theta": [0.0 if j.dh is None else math.radians(j.dh.theta) for j in joints],
-        "ratio": [j.ratio for j in joints],
+        "home": freeze(np.array([j.home for j in joints]) * unit),
+        "max_speed": freeze(_numbers_or_nan(j.max_speed for j in joints) * unit),
+        "max_accel": freeze(_numbers_or_nan(j.max_accel for j in joints) * unit),
+        "max_jerk": freeze(_numbers_or_nan(j.max_jerk for j in joints) * unit),
+        "dh_sign": freeze([float(j.sign) for j in joints]),
+        "dh_theta": freeze([0.0 if j.dh is None else math.radians(j.dh.theta) for j in joints]),
         "homing": tuple(j.homing for j in joints),
         "hard_limits": tuple(j.homing is not None and j.hard_limits is not False for j in joints),
     }
