@@ -84,16 +84,11 @@ def ik(
         check_workers(workers)
     free = redundancy(arm, task)
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
-    if (
-        rounding is None
-        and not (single or position_first)
-        and examine
-        and free is None
-        and (values.ndim == 1 or values.shape == (4, 4))  # a batch prepares nothing for one
-        and (way := one_target.short_way(arm, task)) is not None
-        and (alone := way.solve(values, near)) is not None
-    ):
-        return alone
+    plain = rounding is None and not (single or position_first) and examine and free is None
+    if plain and (values.ndim == 1 or values.shape == (4, 4)):  # a batch prepares nothing for one
+        way = one_target.short_way(arm, task)
+        if way is not None and (alone := way.solve(values, near)) is not None:
+            return alone
     if (turned := actual_arm(arm)) is not arm:
         more: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
         s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **more)

@@ -94,10 +94,8 @@ class _Ends:
         right: list[Entry] = [0.0, height]
         if self.points:
             length = arrays.sub(arrays.add(arrays.dot(e, e), arrays.dot(ta, ta)), arrays.dot(d, d))
-            right = [
-                arrays.add(tb[2], arrays.dot(self.La[6:9], ta)),
-                arrays.mul(0.5, arrays.sub(length, arrays.dot(tb, tb))),
-            ]
+            along = arrays.add(tb[2], arrays.dot(self.La[6:9], ta))
+            right = [along, arrays.mul(0.5, arrays.sub(length, arrays.dot(tb, tb)))]
         # (2) solved for its part in f across joint a, as coefficients of (1, cos qc, sin qc)
         sides: list[list[Entry]] = []
         for row, (gx, gy, gz), value in zip(self.rows.tolist(), factors, right, strict=True):

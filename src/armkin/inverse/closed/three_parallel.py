@@ -107,27 +107,19 @@ class ThreeParallel:
         first, doubt1 = linear(a, b, right, 0, self.scale, prefer[0])
         c1, s1 = first
         # n seen from joint 6
-        turned = [
-            arrays.sub(arrays.mul(c1, n[0]), arrays.mul(s1, n[1])),
-            arrays.add(arrays.mul(s1, n[0]), arrays.mul(c1, n[1])),
-            n[2],
-        ]
-        w = pose.turn_back(D, turned)
+        nx = arrays.sub(arrays.mul(c1, n[0]), arrays.mul(s1, n[1]))
+        ny = arrays.add(arrays.mul(s1, n[0]), arrays.mul(c1, n[1]))
+        w = pose.turn_back(D, [nx, ny, n[2]])
         disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
         thresholds = precision()
         # of an oblique wrist both roots merge whole
         tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
         fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
         c5, s5 = fifth
-        mx, my, mz = self.m
-        v = pose.turn_back(
-            self.B,
-            [
-                arrays.add(arrays.mul(c5, mx), arrays.mul(s5, my)),
-                arrays.sub(arrays.mul(c5, my), arrays.mul(s5, mx)),
-                mz,
-            ],
-        )
+        m = self.m
+        mx = arrays.add(arrays.mul(c5, m[0]), arrays.mul(s5, m[1]))
+        my = arrays.sub(arrays.mul(c5, m[1]), arrays.mul(s5, m[0]))
+        v = pose.turn_back(self.B, [mx, my, m[2]])
         # Rz(-q6) v = w
         sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5], disc)
         # joint 4's frame seen from joint 2

@@ -53,7 +53,7 @@ def run_pass(closed: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[An
     return answers, unsettled, touching, guesses
 
 
-def _own_roots(closed: Loop, pencil: Pencil, target: Array, seed: roots.Seeds, moved: Polished, good: Bool) -> Bool:
+def _own_roots(closed: Loop, pencil: Pencil, target: Array, seed: roots.RootSeeds, moved: Polished, good: Bool) -> Bool:
     """Which seeds led to an answer that has their own value of the hidden joint.
 
     Around a value there are no more solutions than roots, and no two roots may have led to one answer. Near
@@ -70,7 +70,7 @@ def _own_roots(closed: Loop, pencil: Pencil, target: Array, seed: roots.Seeds, m
     return own_root
 
 
-def _blurred_pairs(seed: roots.Seeds, moved: Polished, own_root: Bool, stands: Bool, most: float) -> Int:
+def _blurred_pairs(seed: roots.RootSeeds, moved: Polished, own_root: Bool, stands: Bool, most: float) -> Int:
     """Poses with two roots that share the hidden joint, of those that stand for answers.
 
     Their vectors are good if both were near an answer at once, by at most `most`, and if the answers are not the same.
@@ -93,7 +93,7 @@ def _met_twice(closed: Loop, real: Answers) -> Int:
     return np.asarray(real.pose[order[pairs[np.abs(step).max(axis=1, initial=0.0) < tol.EXAMINED]]])
 
 
-def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) -> roots.Seeds:
+def _without_empty(closed: Loop, seed: roots.RootSeeds, goal: Array, careful: bool) -> roots.RootSeeds:
     """Seeds without roots that stand for nothing.
 
     A simple root, or a double one with one vector, is one if its vector is no product: a solution's vector is a
@@ -111,7 +111,7 @@ def _without_empty(closed: Loop, seed: roots.Seeds, goal: Array, careful: bool) 
     if stays.all():
         return seed
     pose, q, hidden, tilt, rough, defect, gap = seed
-    return roots.Seeds(pose[stays], q[stays], hidden[stays], tilt[stays], rough, defect[stays], gap[stays])
+    return roots.RootSeeds(pose[stays], q[stays], hidden[stays], tilt[stays], rough, defect[stays], gap[stays])
 
 
 def shaken_goal(goal: Array, size: float) -> Array:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.elimination import equal_roots, line_features
 from armkin.inverse.elimination.end_joints import eliminate_ends
@@ -18,11 +19,13 @@ from armkin.inverse.numeric.newton import nudged
 from armkin.model.rotation import inverse
 
 STEADY = 1e5  # size of a pencil's entries up to which its simple roots and their vectors are known well
+ROUGH = 1e6  # size of a pencil's entries above which it is badly scaled
+SINGULAR = 1e9  # size of a singular pencil's answer to a side that no arm is made for
 ONE = 1e3  # quotient of the sine between two roots' vectors and their distance, up to which they have one vector
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # right-hand side that no arm is made for
 
 
-class Seeds(NamedTuple):
+class RootSeeds(NamedTuple):
     """Approximate real solutions of many poses, one row a candidate, poses ascending.
 
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
@@ -46,42 +49,37 @@ class Seeds(NamedTuple):
         return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.ALONE) & (self.tilt < tol.ALONE)
 
 
-def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> Seeds:
+class _Candidates(NamedTuple):
+    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size).
+
+    parted: (M,) of a multiple root, whose vectors are those of all that share it.
+    """
+
+    pose: Int
+    which: Int
+    x: Array
+    tilt: Array
+    u: Array
+    parted: Bool
+
+
+def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> RootSeeds:
     """All roots of the pencil for the pose links ``X`` (N, 4, 4) whose tilt is below ``tolerance``.
 
     part: whether roots are taken apart that several solutions share.
     """
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
-    lead = pencil.products
-    count = equations.shape[2] - lead
-    right = np.empty((X.shape[0], lead, count + 1))
-    right[:, :, :count], right[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
-    G = nudged(np.linalg.solve, equations[:, :, :lead], right)
-    # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
-    rough = (np.abs(G[:, :, :count]).max(axis=(1, 2)) > 1e6) | (np.abs(G[:, :, count]).max(axis=1) > 1e9)
-    steady = np.abs(G[:, :, :count]).max(axis=(1, 2)) < STEADY
-    G = G[:, :, :count]
-    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
-    companion = np.zeros((X.shape[0], 2 * r + 2 * w, 2 * r + 2 * w))
-    companion[:, :lead] = -G
-    companion[:, lead:, 2 * r : lead] = np.eye(w)
+    companion, rough, steady = _companions(pencil, equations)
     roots, vectors = np.linalg.eig(companion)
-    tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
-    pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
-    # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
-    # pair of roots that almost touch.
-    x, u = roots[pose, index].real, vectors.real[pose, :, index]
-    candidates = _Candidates(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
+    candidates = _nearly_real(roots, vectors, tolerance)
     if part and not pencil.prismatic[2:5].any():
         candidates = _part_equal_roots(pencil, candidates, vectors)
-    pose, index, x, slant, u, parted = candidates
-    middle, defect = _middle_joints(pencil, x, u)
+    middle, defect = _middle_joints(pencil, candidates.x, candidates.u)
     finite = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
-    if finite.size < pose.size:
-        pose, index = pose[finite], index[finite]
-        slant, parted = slant[finite], parted[finite]
-        middle, defect = middle[:, finite], defect[finite]
+    if finite.size < len(defect):
+        candidates, middle, defect = rows_of(candidates, finite), middle[:, finite], defect[finite]
+    pose, index, _, tilt, _, parted = candidates
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
@@ -89,7 +87,35 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
     gap = np.where(parted & steady[pose], np.inf, 0.0)
     unsure = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
     gap[unsure] = _root_gaps(roots[pose[unsure]], vectors[pose[unsure]], index[unsure])
-    return Seeds(pose, q, middle[pencil.role.hidden], slant, rough, defect, gap)
+    return RootSeeds(pose, q, middle[pencil.role.hidden], tilt, rough, defect, gap)
+
+
+def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
+    """Matrices (N, size, size) whose eigenvalues are the roots; whether they are badly scaled, and well (N,)."""
+    lead = pencil.products
+    count = equations.shape[2] - lead
+    right = np.empty((len(equations), lead, count + 1))
+    right[:, :, :count], right[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
+    solved = nudged(np.linalg.solve, equations[:, :, :lead], right)
+    G, anywhere = solved[:, :, :count], solved[:, :, count]
+    size = np.abs(G).max(axis=(1, 2))
+    # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
+    rough = (size > ROUGH) | (np.abs(anywhere).max(axis=1) > SINGULAR)
+    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
+    companion = np.zeros((len(G), 2 * r + 2 * w, 2 * r + 2 * w))
+    companion[:, :lead] = -G
+    companion[:, lead:, 2 * r : lead] = np.eye(w)
+    return companion, rough, size < STEADY
+
+
+def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _Candidates:
+    """Of roots (N, size) and their vectors (N, size, size) those whose tilt is below tolerance."""
+    tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
+    pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
+    # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
+    # pair of roots that almost touch.
+    x, u = roots[pose, index].real, vectors.real[pose, :, index]
+    return _Candidates(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
 
 
 def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
@@ -105,20 +131,6 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     away = np.stack([a, b, e]) - part[[0, 1, 5]]
     turning = ~pencil.prismatic[[0, 1, 5]][:, None]
     return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < tol.FOLLOWS).all(axis=0))
-
-
-class _Candidates(NamedTuple):
-    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size).
-
-    parted: (M,) of a multiple root, whose vectors are those of all that share it.
-    """
-
-    pose: Int
-    which: Int
-    x: Array
-    tilt: Array
-    u: Array
-    parted: Bool
 
 
 def _part_equal_roots(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
@@ -198,7 +210,7 @@ def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
 
 
 def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
-    """Values (3, M) of m1, m2, m3 from the roots (M,) and the pencil's eigenvectors (M, size); and `Seeds.defect`."""
+    """Values (3, M) of m1, m2, m3 from the roots (M,) and the eigenvectors (M, size); and `RootSeeds.defect`."""
     v = _vector(pencil, x, u)
     row = np.arange(v.shape[0])
     size = v * v

@@ -152,7 +152,7 @@ def distances(arm: Arm, a: Array, b: Array) -> Array:
 
 def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array, Int]:
     """Smallest singular value (M,) of the task's Jacobian, right vectors (M, n, n), and nullity (M,) below 1e-6."""
-    linear = Linear.at(arm, task, q, target)
+    linear = Linear.linearise(arm, task, q, target)
     sigma, nullity = _smallest(arm, task, linear.S)
     return sigma, linear.V, nullity
 
@@ -176,7 +176,7 @@ class Linear(NamedTuple):
     V: Array
 
     @classmethod
-    def at(cls, arm: Arm, task: Task, q: Array, target: Array) -> Linear:
+    def linearise(cls, arm: Arm, task: Task, q: Array, target: Array) -> Linear:
         """Of postures (M, n) and their targets."""
         r, J = scaled(arm, task, q, target)
         return cls(r, *np.linalg.svd(J))

@@ -74,7 +74,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     known: the residuals there and the Jacobians' singular values, if they are.
     """
     M, n = q.shape
-    linear = known or newton.Linear.at(arm, task, q, target)
+    linear = known or newton.Linear.linearise(arm, task, q, target)
     (r, U, S, V), curve = linear, _structure_of_jacobians(linear)
     rows = r.shape[1]
     if rows < n:
@@ -100,7 +100,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
 
 def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
     """The curves through postures (M, n) as far as span (M,)."""
-    linear = newton.Linear.at(arm, task, q, target)
+    linear = newton.Linear.linearise(arm, task, q, target)
     curve = _structure_of_jacobians(linear)
     curve.span[...] = span
     _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))

@@ -58,12 +58,10 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     gap, alike = nearest
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
-    if (
-        elimination is not None
-        and gap > tol.BLURRED
-        and (straight := _by_elimination(arm, task, alike, gap, elimination())) is not None
-    ):
-        return straight
+    if elimination is not None and gap > tol.BLURRED:
+        straight = _by_elimination(arm, task, alike, gap, elimination())
+        if straight is not None:
+            return straight
 
     def rows(target: Array) -> Rows:
         parts = slices(max(len(target), 1), CHUNK)

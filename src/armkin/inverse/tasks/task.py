@@ -167,10 +167,8 @@ def nearest_rotation(R: Array) -> Array:
     for _ in range(2):
         xx, yy, zz = (1.5 - 0.5 * arrays.dot(v, v) for v in (x, y, z))
         xy, yz, zx = (-0.5 * arrays.dot(u, v) for u, v in ((x, y), (y, z), (z, x)))
-        x, y, z = (
-            arrays.combine(1.0, arrays.combine(a, x, b, y), c, z)
-            for a, b, c in ((xx, xy, zx), (xy, yy, yz), (zx, yz, zz))
-        )
+        rows = ((xx, xy, zx), (xy, yy, yz), (zx, yz, zz))
+        x, y, z = (arrays.combine(1.0, arrays.combine(a, x, b, y), c, z) for a, b, c in rows)
     return np.moveaxis(np.array([x, y, z]), 2, 0).swapaxes(1, 2)
 
 
