@@ -332,6 +332,18 @@ def test_every_class_and_public_function_has_a_docstring() -> None:
     assert not silent
 
 
+def test_every_function_of_more_than_25_lines_has_a_docstring() -> None:
+    """Private ones, too: nobody reads so many lines to learn what they are for."""
+    silent = {
+        f"{module}.{node.name}"
+        for module, path in MODULES.items()
+        for node in _tree_nodes(path)
+        if isinstance(node, ast.FunctionDef) and node.name != "__init__" and ast.get_docstring(node) is None
+        if (node.end_lineno or 0) - node.lineno >= 25
+    }
+    assert not silent
+
+
 def _is_public(node: ast.FunctionDef) -> bool:
     return not node.name.startswith("_") and not any(
         ast.unparse(one).endswith(".setter") for one in node.decorator_list

@@ -119,6 +119,7 @@ _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "
 
 
 def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
+    """What the rows would be in other units, with columns swapped, or with one joint's sign changed."""
     c, x = rows.c, rows.position
     degree = units.joint_scale(arm)
     readings = [

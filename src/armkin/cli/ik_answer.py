@@ -113,6 +113,7 @@ def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
 
 
 def _branch_json(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
+    """A branch as data of JSON [deg | mm]; turns: with its other turns within limits."""
     arm = request.arm
     row: Branch = {
         "joints": branch.joints,

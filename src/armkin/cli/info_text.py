@@ -115,6 +115,7 @@ def _poses_text(answer: Mapping[str, Any]) -> str:
 
 
 def _steppers_table(answer: Mapping[str, Any]) -> str:
+    """How the steppers' pulses per turn come about; empty where there is none."""
     heading = ["stepper", "axis", "full steps", "x micro", "x gear", "x pulley", "= pulses/turn", "one pulse"]
     rows = [[*heading, "", ""]]
     for motor in answer["motors"]:

@@ -148,6 +148,10 @@ def _checked_goals(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[floa
 
 
 def _from_pipe(robot: str | None, scene: str | None, tool: str | None) -> tuple[Arm, Goals]:
+    """The arm and the goals (N, n) [rad | mm] of the answer on standard input.
+
+    Raises FileError if its robot file, scene or tool is another one now.
+    """
     import numpy as np
 
     answer = piped_answers.read_poses(robot)

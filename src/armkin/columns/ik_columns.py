@@ -86,6 +86,7 @@ class _Answers(NamedTuple):
 def _list_branches(
     request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
 ) -> BranchTable:
+    """Lines of a block of targets: all their branches, or the nearest one; quick: what finds that in C, if it can."""
     s, block, scale = answers.s, answers.rows, units.joint_scale(request.arm)
     q, valid = answers.q[block], s.valid[block]
     within, free = answers.within_limits[block], answers.free[block]

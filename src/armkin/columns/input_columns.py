@@ -47,6 +47,7 @@ def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> li
 
 
 def _read_npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    """Columns `names` of a .npz, (at most rows, columns) at a time. Raises FileError for what cannot be read."""
     try:
         with ExitStack() as stack:
             archive = stack.enter_context(zipfile.ZipFile(path))

@@ -40,6 +40,7 @@ def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunk
 
 
 def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> Iterator[Any]:
+    """The chunks' answers in their order; `AHEAD` chunks for each thread, at least two, are on the cluster."""
     waiting: deque[Any] = deque()
     name = hashlib.sha256(data).hexdigest()
     while True:

@@ -154,6 +154,7 @@ def _guard_of_pairs(
     pairs: list[tuple[int, int]],
     left_out: tuple[tuple[str, str], ...],
 ) -> Guard:
+    """A guard of bodies against obstacles, and of pairs (later, earlier) of bodies; left_out: pairs that overlap."""
     form = bodies(arm)
     solid = [k for k in range(1, arm.n + 1) if form.exists(k)]
     moving = np.flatnonzero(np.isin(form.owner, solid))

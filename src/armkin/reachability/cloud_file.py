@@ -76,6 +76,7 @@ def _ply_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequ
 
 @contextmanager
 def _npz_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
+    """What writes joints (count, n) [deg | mm], positions (count, 3) [mm] and measures (count,) into a .npz."""
     # A zip file takes one member after the other: each array waits in a nameless file beside the target.
     folder = os.path.dirname(os.path.realpath(path))
     shapes = {"joints": (count, arm.n), "position": (count, 3), **dict.fromkeys(measures, (count,))}

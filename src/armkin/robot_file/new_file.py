@@ -73,6 +73,7 @@ def new_file_text(name: str, convention: str, rows: Sequence[Row], source: str =
 
 
 def _joint_lines(row: Row, axis: str, *, with_comments: bool) -> list[str]:
+    """A joint's lines in a new robot file; keys that its row says nothing of are comments."""
     unit = "mm" if row.prismatic else "deg"
     dh = ", ".join(f"{key}: {_number_text(getattr(row, key))}" for key in ("alpha", "a", "d", "theta"))
     lower, upper = row.limits or (-90.0, 90.0)

@@ -98,6 +98,7 @@ def load_yaml(text: bytes | str, kind: Kind = ROBOT_FILE) -> Document:
 
 
 def _decode(raw: bytes | str, kind: Kind) -> str:
+    """The text of a file. Raises StrictYamlError, with the line, for what is no UTF-8 or no text."""
     if isinstance(raw, str):
         text = raw
     else:

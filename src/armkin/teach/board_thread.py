@@ -232,6 +232,7 @@ class BoardThread:
         self.set_follower("")
 
     def _state_json(self) -> dict[str, Any]:
+        """What pages are told of the board: its state, times [s], and where its arm stands [counts, deg | mm]."""
         machine = self.machine
         state: dict[str, Any] = {
             "port": self.port,

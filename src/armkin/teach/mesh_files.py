@@ -52,6 +52,7 @@ def _parse_stl(raw: bytes) -> Array:
 
 
 def _parse_collada(raw: bytes) -> Array:
+    """Triangles (N, 3, 3) [m] of a Collada file. Raises ValueError for what is no XML."""
     try:
         from defusedxml.ElementTree import fromstring
     except ImportError:

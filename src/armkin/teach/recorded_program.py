@@ -171,6 +171,7 @@ class Program:
         self.names.insert(index, "")
 
     def _make_move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
+        """A move of a path file [mm, deg] from what a page sends. Raises UsageError for what is no move."""
         if kind == "wait":
             return {"wait": request_checks.number_field(fields, "seconds", 0, 3600)}
         if kind == "grip":

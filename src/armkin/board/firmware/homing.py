@@ -211,6 +211,10 @@ def _switch_value(arm: Arm, joint: int) -> float:
 
 
 def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
+    """Joint j's search as the board takes it: rates [counts/s], ways [counts], time [0.1 s].
+
+    Raises UsageError where the board's whole numbers do not hold them.
+    """
     name, unit, homing = arm.joint_names[j], float(joint_scale(arm)[j]), arm.homing[j]
     assert homing is not None
     board = configuration.board

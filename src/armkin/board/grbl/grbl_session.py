@@ -251,6 +251,7 @@ class Session:
             self._hear(line.strip("\r "))
 
     def _hear(self, line: str) -> None:
+        """Take a line that has come; GrblError for a refusal or an alarm."""
         if line == "ok":
             self._heard += 1
             if self._sent:

@@ -79,6 +79,7 @@ class Commands:
             self._motors.axes.known &= ~self._board.servo_mask
 
     def _set_position(self, payload: bytes) -> None:
+        """SET_POSITION: motors whose position is lost stand at these counts."""
         if len(payload) < 4:
             raise RefusedError(Error.LENGTH)
         axes = axes_of(struct.unpack_from("<H", payload, 2)[0])

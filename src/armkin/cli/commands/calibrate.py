@@ -132,6 +132,7 @@ def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str
 
 
 def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
+    """A calibration as data of JSON [mm, deg]; numbers: of its rows in their file. Errors are without flagged rows."""
     import numpy as np
 
     used = np.delete(np.arange(len(calibration.before)), calibration.flagged)
@@ -163,6 +164,7 @@ def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | N
 
 
 def _text(arm: Arm, answer: dict[str, Any]) -> str:
+    """An answer as tables, errors in mm, and what was left out or not seen."""
     rows = [["on rows not used", "before", "after", ""]]
     for key, name in (("median_mm", "median"), ("rms_mm", "rms"), ("max_mm", "largest")):
         rows.append(

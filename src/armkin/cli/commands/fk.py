@@ -112,6 +112,7 @@ def _arm_and_poses(
 
 
 def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Iterator[Fk]:
+    """Answers of `armkin fk`, one a row of joint values (N, n) [deg | mm]: poses in mm and deg."""
     from armkin.model import rotation
 
     q = units.joints_in(arm, chunk.values)

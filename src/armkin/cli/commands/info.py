@@ -35,6 +35,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
 
 
 def _answer(arm: Arm, task: str | None) -> Info:
+    """What is known of an arm, as data of JSON [mm, deg]."""
     from armkin.board.backend.missing_keys import lines_to_add, missing_by_command
 
     file = arm.file

@@ -179,6 +179,7 @@ def _planned_json(place: Place, plan: PathFromPlace) -> PlannedPlace:
 
 
 def _text(places: Sequence[Place]) -> str:
+    """Tables of each arm's best place [mm, deg], and of the paths that were planned from places."""
     rows = [["robot", "x/mm", "y/mm", "z/mm", "yaw/deg", "reached", "margin/mm", "places that reach all"]]
     for candidate in places:
         i, j, k = candidate.best

@@ -124,6 +124,7 @@ class _Row(NamedTuple):
 
 
 def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterator[Pulses]:
+    """Answers of `armkin pulses`, one a row of joint values (N, n) [deg | mm]; origin: those that moves count from."""
     from armkin.motors import motor_names, outside_travel, pulse_units, resolution
 
     q = units.joints_in(arm, chunk.values)
@@ -166,6 +167,7 @@ def _rounded_keys(best: Best) -> Iterator[Any]:
 
 
 def _text(arm: Arm, answer: Pulses) -> str:
+    """An answer as tables: motors [steps | us], joints [deg | mm], tip [mm]; as asked and as whole pulses give it."""
     motors = [["motor", "pulses", "move", ""]]
     columns = (answer["motors"], answer["pulses"], answer["moves"], answer["pulse_units"])
     for name, count, move, unit in zip(*columns, strict=True):

@@ -138,6 +138,7 @@ def _grid_points(grid: str) -> list[int]:
 
 
 def _answer(survey: Workspace) -> Answer:
+    """A survey as data of JSON: ends and reach in mm, its extent in mm^3, or in mm^2 of a planar arm."""
     x, y, z = ([low, high] for low, high in zip((survey.low + 0.0).tolist(), (survey.high + 0.0).tolist(), strict=True))
     head = render.head(survey.arm)
     answer: Answer = {

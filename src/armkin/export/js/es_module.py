@@ -54,6 +54,7 @@ def module_text(arm: Arm, task_name: str | None = None) -> str:
 
 
 def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
+    """The module's text: data, kinematics, keep-outs, solver, and pulses if driven. UsageError: it has no form."""
     turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
     task, named = solver(turned, task_name)
     geometry = plain_form(turned, task, named)

@@ -139,6 +139,7 @@ class Position:
         return six
 
     def _quartic(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        """Joint 3 as a root of the quartic, A regular; joint 2 then turns y(q3) to (gx, gy). size: a unit of length."""
         g = [self._affine(row, sides) for row in np.linalg.inv(self.A)]  # coefficients of gx, gy
         across = (-quadratics.of_form(self.across)).tolist()
         if not self.prismatic[2]:
@@ -174,6 +175,7 @@ class Position:
         return third, second, doubt | doubt2
 
     def _rank_one(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
+        """Joint 3 from the combination of the equations that holds q3 alone, joint 2 from the other; A of rank one."""
         alone = self._affine(self.alone, sides)
         if self.prismatic[2]:
             d, doubt = sub.quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])

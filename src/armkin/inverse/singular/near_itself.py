@@ -57,6 +57,7 @@ def take(goals: Goals, batch: Batch, rows: Int) -> Int:
 
 
 def _take_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
+    """`take` for rows whose branches fit into the cache."""
     arm, task = goals.arm, goals.task
     rows = rows[~limits.outside_limits(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):

@@ -233,6 +233,7 @@ class Walk:
         self.current_moves = moves_now
 
     def _plan_group(self) -> None:
+        """Plan what has gathered: a joint move to a target alone, else the runs of its route with what happens there."""
         if not self.pieces:
             if self.goal is not None:
                 self.append_joint_move(_nearest_posture(self, self.goal, self.goal_branch), self.leads)
@@ -277,9 +278,8 @@ class Walk:
         self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed
     ) -> None:
         """Put a run's curves into the plan, with the pauses where they begin; misses: of the given points."""
-        events = {
-            round(float(route.ends[number_of_curve[k]]), 6): self.pauses[k] for k in self.pauses if k in number_of_curve
-        }
+        begins = {k: round(float(route.ends[number_of_curve[k]]), 6) for k in self.pauses if k in number_of_curve}
+        events = {begin: self.pauses[k] for k, begin in begins.items()}
         for curve in curves:
             path_ = joint_way(curve)
             for kind, value in events.pop(round(float(path_.s[0]), 6), ()):

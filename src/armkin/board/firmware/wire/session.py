@@ -198,6 +198,7 @@ class Session:
         return self._tag
 
     def _hear(self, timeout: float) -> None:
+        """Take the replies that come within timeout [s]; LinkError for those of another session or board."""
         for reply in self.line.replies(timeout):
             self.heard = self.port.now()
             if isinstance(reply, Info):  # of a HELLO that was repeated
