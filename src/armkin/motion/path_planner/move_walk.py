@@ -233,7 +233,7 @@ class Walk:
         self.current_moves = moves_now
 
     def _plan_group(self) -> None:
-        """Plan what has gathered: a joint move to a target alone, else the runs of its route with what happens there."""
+        """Plan what has gathered: a joint move to a lone target, else the runs of its route, and what happens there."""
         if not self.pieces:
             if self.goal is not None:
                 self.append_joint_move(_nearest_posture(self, self.goal, self.goal_branch), self.leads)
