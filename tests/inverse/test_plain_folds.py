@@ -50,7 +50,7 @@ def test_plain_folds_are_those_that_one_by_one_are_found(name: str, monkeypatch:
     q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (8, arm.n)) * np.pi / 4])
     target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
     short = armkin.ik(arm, target)
-    monkeypatch.setattr(components, "FEW", 0)
+    monkeypatch.setattr(components, "FEW_CANDIDATES", 0)
     long = armkin.ik(arm, target)
     assert {0, 1} <= set(short.status.tolist())
     for field in ("status", "valid", "free", "complete"):

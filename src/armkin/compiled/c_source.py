@@ -18,7 +18,7 @@ from armkin.inverse.numeric.tolerances import (
     CLOSED,
     DRIFT,
     ERROR,
-    FAR,
+    FAR_DISTANCE,
     FOLD_WAY,
     FOLDED,
     HIGH,
@@ -34,8 +34,8 @@ from armkin.inverse.numeric.tolerances import (
     WEAK,
 )
 from armkin.inverse.singular import chains, local_structure, self_motions
-from armkin.inverse.singular.near_itself import COARSE, ROOM
-from armkin.inverse.tasks.task import LARGEST
+from armkin.inverse.singular.near_itself import COARSE_ROOM, ROOM
+from armkin.inverse.tasks.task import MAX_TARGET
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
@@ -132,7 +132,7 @@ def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[s
         "goal": str(arm_formulas.goal_size(task)),
         "accepted": number_text(accepted),
         "room": number_text(ROOM * arm.reach),
-        "coarse": number_text(COARSE * arm.reach),
+        "coarse": number_text(COARSE_ROOM * arm.reach),
         "close": ", ".join(number_text(THERE * unit) for unit in radian_or_reach(arm).tolist()),
         "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
         "lowest": ", ".join(number_text(v - SLACK) for v in arm.lower.tolist()),
@@ -165,7 +165,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
     named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
     named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
-    named |= {"fine": str(len(local_structure.FINE)), "points_count": str(len(local_structure.POINTS))}
+    named |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
     tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
     tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
     named |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
@@ -173,9 +173,9 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "nodes_count": str(local_structure.NODES),
         "links": str(chains.LINKS),
         "few_links": str(chains.FEW_LINKS),
-        "along": str(self_motions.ALONG),
+        "along": str(self_motions.LINE_JOINTS),
     }
-    named |= dict(zip(("shorter", "longer"), map(number_text, local_structure.LONGER), strict=True))
+    named |= dict(zip(("shorter", "longer"), map(number_text, local_structure.LENGTH_RATIO), strict=True))
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
     named["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
     named["sums"] = str(len(sums))
@@ -183,10 +183,10 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
 
 
 def _farthest_coordinate(arm: Arm) -> float:
-    """How large a coordinate may be [mm]; with slides, so that the target is no more than `FAR` reaches away."""
+    """How large a coordinate may be [mm]; with slides, so that the target is at most `FAR_DISTANCE` reaches away."""
     if not arm.prismatic.any():
-        return LARGEST
-    return max((FAR * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
+        return MAX_TARGET
+    return max((FAR_DISTANCE * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
 
 
 def _part_text(name: str) -> str:

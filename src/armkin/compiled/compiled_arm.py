@@ -23,7 +23,7 @@ from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow_branches
-from armkin.inverse.numeric.tolerances import FAR, SOLUTION
+from armkin.inverse.numeric.tolerances import FAR_DISTANCE, SOLUTION
 from armkin.inverse.redundant.families import families
 from armkin.inverse.run.workers import check_workers, share_rows
 from armkin.inverse.singular import near_itself
@@ -269,7 +269,7 @@ class _CompiledTask:
     def _finish(self, batch: Results, target: Array) -> None:
         """What is known of far targets, and numbers of branches that have no order of their own."""
         if self.arm.prismatic.any():
-            batch.complete[distance(self.arm, self.task, target) > FAR] = False
+            batch.complete[distance(self.arm, self.task, target) > FAR_DISTANCE] = False
         if not self.geometry.ordered:
             batch.branch[...] = follow_branches(self.arm, self.task, batch.q, target)
 

@@ -39,7 +39,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
 from armkin.model.arm import Arm, actual_arm
 
-WORTH = 256  # poses of an elimination that are worth a thread; a thread's own chunks have as many
+THREAD_POSES = 256  # poses of an elimination that are worth a thread; a thread's own chunks have as many
 
 
 def ik(
@@ -137,7 +137,7 @@ def solve_by(  # noqa: C901 - what is looked at after the closed form, in its or
         if arm.keep_out:
             batch = legal_postures.with_free_postures(goals, batch)
     if arm.prismatic.any():
-        batch.complete[distance(arm, task, target) > tol.FAR] = False
+        batch.complete[distance(arm, task, target) > tol.FAR_DISTANCE] = False
     if not geometry.ordered:
         batch.branch[...] = follow_branches(arm, task, batch.q, target)
     names = branch_names(arm, task, geometry, count)
@@ -198,7 +198,7 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     assert geometry.rows is not None
     arm, task, target, near = goals
     solve = (geometry.unmoved if examine else None) or geometry.rows
-    parts = share_rows(lambda rows: solve(target[rows]), len(target), workers, WORTH, WORTH)
+    parts = share_rows(lambda rows: solve(target[rows]), len(target), workers, THREAD_POSES, THREAD_POSES)
     q, doubt, complete, lost, guesses = stack_rows(parts)
     B = q.shape[1]
     batch = empty_batch(len(target), B, arm.n)

@@ -15,10 +15,10 @@ from armkin.export.c.source_parts import part_text
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.choose_variable import Kind
-from armkin.inverse.elimination.merge import MOST, weights
+from armkin.inverse.elimination.merge import MAX_ANSWERS, weights
 from armkin.inverse.elimination.method import Elimination
 from armkin.inverse.elimination.passes import REGULAR, TILT, shaken_goal
-from armkin.inverse.elimination.roots import STEADY
+from armkin.inverse.elimination.roots import STEADY_ENTRY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
@@ -41,7 +41,7 @@ _NAMED = {  # numbers that the method reads, by the names that they have in Pyth
         "INFINITE", "NO_PRODUCT", "OWN_ROOT", "PAIRED", "SAME_KEY", "SAME_ROOT", "STRAY", "TWIN_ROOTS", "UPRIGHT",
     )
 }  # fmt: skip
-BRANCHES = MOST
+BRANCHES = MAX_ANSWERS
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
 OWN = 2  # pencils of its own that a kind of poses has
 PASSES = 4  # passes, of the seven, that the C code makes; what they leave open is told as doubt
@@ -88,7 +88,7 @@ def candidates_code(
     pencils, numbers_of = pencils_of(kinds)
     loop, passes = elimination.loop, len(kinds[0])
     numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
-    numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY}
+    numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY_ENTRY}
     lines = [f"#define ARM_{name} {value}" for name, value in _array_sizes(pencils, passes).items()]
     lines += [f"#define ARM_{name} {c_and_js_code.number_text(value)}" for name, value in numbers.items()]
     moves = np.concatenate(moves_of(passes))

@@ -18,7 +18,7 @@ from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundant import held_by_near, redundancy
-from armkin.inverse.tasks.task import LARGEST, ROUNDED
+from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED
 from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 # What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
 # rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
-_DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 5e-6, "LARGEST": LARGEST}
+_DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 5e-6, "LARGEST": MAX_TARGET}
 _SINGLE = {"ACCEPTED": 1e-10, "SOLUTION": 1e-9, "NEARBY": 1e-6, "SAME": 1e-3, "ROTATION": 1e-3, "LARGEST": 1e9}
 
 

@@ -14,7 +14,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
-OWN = -1  # label of a posture that comes from `near`
+OWN_LABEL = -1  # label of a posture that comes from `near`
 
 
 class Goals(NamedTuple):

@@ -25,10 +25,10 @@ from armkin.model.arm import Arm
 # by right angles about the base's axes, shows nothing: only the position's last digit tells there.
 DEFECTS = 4.0  # bound of a rounded target's error, in defects of its rotation
 HALVES = 12.0  # bound of a rounded target's error, in halves of the last digit of its rotation
-COARSEST = 5  # digits, at least, of a matrix's entries: one of fewer is no rotation to that many
+MIN_DIGITS = 5  # digits, at least, of a matrix's entries: one of fewer is no rotation to that many
 PRINTED = 6  # digits, at least, that a position is printed with; zeros at its end show fewer
 BLOCK = 2_048  # rows worked on at once: all their arrays fit the cache
-FEWEST, MOST = 3, 12  # printed decimals that count as rounded, and as exact
+MIN_DECIMALS, MAX_DECIMALS = 3, 12  # printed decimals that count as rounded, and as exact
 
 
 def of_targets(
@@ -82,9 +82,9 @@ def last_place_of_position(p: Array) -> Array:
     p = np.where(np.abs(p) < tol.SOLUTION, 0.0, p)  # what is that small is rounding
     size = np.floor(np.log10(np.maximum(np.abs(p), tol.SOLUTION)))
     half = np.zeros(len(p))
-    typed = _are_whole(p * 10.0 ** (FEWEST - 1)) & _are_whole(p * 10.0 ** (PRINTED - 2 - size))
+    typed = _are_whole(p * 10.0 ** (MIN_DECIMALS - 1)) & _are_whole(p * 10.0 ** (PRINTED - 2 - size))
     left = np.flatnonzero(~typed.all(axis=1))
-    for digits in range(PRINTED, MOST):
+    for digits in range(PRINTED, MAX_DECIMALS):
         fits = _are_whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
         half[left[fits]] = 0.5 * 10.0 ** (size[left[fits]].max(axis=1) + 1 - digits)
         left = left[~fits]
@@ -102,7 +102,7 @@ def last_place(R: Array) -> Array:
     entries = R.reshape(-1, 9)
     half = np.where((entries == entries.astype(np.float32)).all(axis=1), tol.FLOAT32, 0.0)
     left = np.flatnonzero(half == 0.0)
-    for digits in range(COARSEST, MOST):
+    for digits in range(MIN_DIGITS, MAX_DECIMALS):
         numbers = entries[left]
         size = np.floor(np.log10(np.maximum(np.abs(numbers), tol.FEW_DIGITS)))
         fits = (_are_whole(numbers * 10.0 ** (digits - 1 - size)) | (np.abs(numbers) < tol.FEW_DIGITS)).all(axis=1)
@@ -122,7 +122,7 @@ def printed_rounding(units: Sequence[str], values: Array, reach: float, decimals
     """
     values = np.asarray(values, float).reshape(-1, len(units))
     if decimals is None:  # all numbers of a row have as many: there are no more sizes than decimals
-        sizes = printed_rounding(units, values[:0], reach, np.repeat(np.arange(MOST)[:, None], len(units), axis=1))
+        sizes = printed_rounding(units, values[:0], reach, np.repeat(np.arange(MAX_DECIMALS)[:, None], len(units), 1))
         blocks = [_needed_decimals(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
         return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
     halves = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
@@ -132,16 +132,16 @@ def printed_rounding(units: Sequence[str], values: Array, reach: float, decimals
     return np.asarray(np.hypot(np.linalg.norm((halves * scale)[:, ~angles], axis=1), turned))
 
 
-# half a unit of the last of so many decimals, 0 below FEWEST; of more than 300 it is nothing, too
-_HALF = np.where(np.arange(300) < FEWEST, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
+# half a unit of the last of so many decimals, 0 below MIN_DECIMALS; of more than 300 it is nothing, too
+_HALF = np.where(np.arange(300) < MIN_DECIMALS, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
 
 
 def _needed_decimals(values: Array) -> Int:
-    """How many decimals numbers (N, m) need: 0 below FEWEST, and for numbers that need MOST, which are not rounded."""
+    """How many decimals numbers (N, m) need: 0 below MIN_DECIMALS, and from MAX_DECIMALS on: those are not rounded."""
     needed = np.zeros(values.size, np.intp)
     number = values.ravel()
-    left = np.flatnonzero(~_are_whole(number * 10.0 ** (FEWEST - 1)))
-    for decimals in range(FEWEST, MOST):
+    left = np.flatnonzero(~_are_whole(number * 10.0 ** (MIN_DECIMALS - 1)))
+    for decimals in range(MIN_DECIMALS, MAX_DECIMALS):
         if not len(left):
             break
         fits = _are_whole(number[left] * 10.0**decimals)

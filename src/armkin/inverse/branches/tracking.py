@@ -16,8 +16,8 @@ from armkin.model.arm import Arm
 
 CHUNK = 2048  # targets linked at once
 
-CLOSE = 0.2  # distance [rad or reaches] that a branch may move from one target to the next
-CLEAR = 1.5  # ratio, at least, of the distances to the second best partner and to the best one
+STEP_DISTANCE = 0.2  # distance [rad or reaches] that a branch may move from one target to the next
+CLEAR_RATIO = 1.5  # ratio, at least, of the distances to the second best partner and to the best one
 
 
 def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
@@ -27,7 +27,7 @@ def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     last. Returns (N, B): numbers from 0 to B - 1, each once in a row, -1 where there is no branch.
 
     Two branches of neighbouring targets are linked if each is the other's nearest, within
-    `CLOSE`, and clearly so. Chains of links keep the number of their first branch; branches
+    `STEP_DISTANCE`, and clearly so. Chains of links keep the number of their first branch; branches
     without a link get the smallest free ones, in their order.
     """
     N, B, _ = q.shape
@@ -57,7 +57,7 @@ def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
     if len(task.sums):
         turned = moved[:, task.position :]
         turned[...] = wrap_angle(turned)
-    return np.asarray(np.abs(moved).max(axis=1) < CLOSE)
+    return np.asarray(np.abs(moved).max(axis=1) < STEP_DISTANCE)
 
 
 def _linked_branches(arm: Arm, after: Array, before: Array) -> Int:
@@ -66,6 +66,6 @@ def _linked_branches(arm: Arm, after: Array, before: Array) -> Int:
     apart[np.isnan(apart)] = np.inf
     partner, back = apart.argmin(axis=2), apart.argmin(axis=1)
     nearest, second = np.moveaxis(np.partition(apart, 1, axis=2)[:, :, :2], 2, 0)
-    clear = (nearest < CLOSE) & (second > CLEAR * nearest)
+    clear = (nearest < STEP_DISTANCE) & (second > CLEAR_RATIO * nearest)
     mutual = np.take_along_axis(back, partner, axis=1) == np.arange(after.shape[1])
     return np.where(clear & mutual, partner, -1)

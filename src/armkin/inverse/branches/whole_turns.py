@@ -17,8 +17,8 @@ from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 
 TURN = 2 * np.pi  # whole turn [rad]
-HALF = np.pi + SLACK  # distance [rad] above `near`, at most, of a copy
-MOST = 50_000  # copies of one branch that `turns` gives
+HALF_TURN = np.pi + SLACK  # distance [rad] above `near`, at most, of a copy
+MAX_COPIES = 50_000  # copies of one branch that `turns` gives
 
 
 def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in the cache
@@ -45,7 +45,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
     if at_zero:
         value = _principal_values(value)
     else:
-        turned = np.asarray((near + HALF) - value)  # one array for all steps: it stays in the cache
+        turned = np.asarray((near + HALF_TURN) - value)  # one array for all steps: it stays in the cache
         turned /= TURN
         np.floor(turned, out=turned)
         turned *= TURN
@@ -116,7 +116,7 @@ def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a
     if near == 0.0:
         value, first = principal, -math.pi
     else:
-        value, first = value + TURN * float(math.floor((near + HALF - value) / TURN)), near - math.pi
+        value, first = value + TURN * float(math.floor((near + HALF_TURN - value) / TURN)), near - math.pi
     if (lower <= first and upper >= first + TURN) or low <= value <= high:
         return value, True
     if value < low and upper > first + TURN - SLACK:
@@ -190,9 +190,9 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
             last = int(np.floor((upper + SLACK - row[i]) / TURN))
             choices.append([float(row[i] + TURN * k) for k in range(last, first - 1, -1)])
     count = math.prod(map(len, choices))
-    if count > MOST:
-        message = f"{arm.name}: {count:,} copies of one branch are within the limits; at most {MOST:,} are listed"
-        raise UsageError(message, copies=count, most=MOST)
+    if count > MAX_COPIES:
+        message = f"{arm.name}: {count:,} copies of one branch are within the limits; at most {MAX_COPIES:,} are listed"
+        raise UsageError(message, copies=count, most=MAX_COPIES)
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - close) * unit).sum(axis=1)

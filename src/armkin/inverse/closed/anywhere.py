@@ -82,7 +82,7 @@ class _Ends:
         self.A = self.rows[:, :2]
         U, S, _ = np.linalg.svd(self.A)
         ratio = float(S[1] / max(S[0], tol.NO_SIZE))
-        self.regular, self.close = ratio > tolerance, tolerance < ratio <= tol.NEAR
+        self.regular, self.close = ratio > tolerance, tolerance < ratio <= tol.NEAR_DEFECT
         self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
 
     def solve(

@@ -21,9 +21,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, shifted_targets
 from armkin.model.arm import Arm
 
-FEW = 8  # targets up to which plain Python is faster than arrays
+FEW_TARGETS = 8  # targets up to which plain Python is faster than arrays
 FREED = 24  # values tried for a joint that a target leaves free
-CLOSER = 7  # refinements of the best of these values, each sixteen times closer: to 1e-9 rad
+REFINEMENTS = 7  # refinements of the best of these values, each sixteen times closer: to 1e-9 rad
 # Steps from `near` [rad] all round, none of them to a round value: there a wrist may be straight, whose joints are free
 # as well and would jump to what is preferred.
 ROUND = np.asarray((np.arange(FREED)[:, None] + 0.37) * (2.0 * np.pi / FREED) - np.pi, np.float64)
@@ -101,7 +101,7 @@ class Recorded:
 
     def in_numbers(self, target: Array) -> list[Array]:
         """`candidates` to the last digit the same, whatever a target is asked together with."""
-        if len(target) > FEW:
+        if len(target) > FEW_TARGETS:
             return self.code.run_exactly(target_entries(self.task, target))
         full = self.task.orientation == "full"
         return self.code.one_by_one([pose.read_one(row) if full else row.tolist() for row in target])
@@ -157,7 +157,7 @@ class Recorded:
         """
         shift, apart = ROUND, 2.0 * np.pi / FREED
         best, open_, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
-        for closer in range(CLOSER):
+        for closer in range(REFINEMENTS):
             single[open_] = closer > 0
             _, miss = self._at_shifts(target[open_], near[open_], best[open_, None] + shift)
             size = np.where(loose[open_, None], miss, np.inf).min(axis=2)

@@ -17,9 +17,9 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near
-MOST = 12  # places looked at, at most, for each target
-AWAY = 0.4  # distance [rad, reaches] from a crossing at which the other self-motion is looked for
-ONE = 0.13  # distance [rad, reaches] of places that are one: half a step of a joint that turns
+MAX_PLACES = 12  # places looked at, at most, for each target
+OTHER_SIDE = 0.4  # distance [rad, reaches] from a crossing at which the other self-motion is looked for
+SAME_PLACE = 0.13  # distance [rad, reaches] of places that are one: half a step of a joint that turns
 STEP = 1.0  # movement [rad, reaches] of joints from one step to the next, above which they are not on one curve
 
 
@@ -46,35 +46,35 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         meets |= changes
-        second[changes] *= tol.RATHER  # there, not at a step beside it
+        second[changes] *= tol.SIGN_FACTOR  # there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
         meets[:, :, b] &= ~twin.any(axis=2)
     spot = _distinct_places(arm, place.reshape(N, -1, n), np.where(meets, second, np.inf).reshape(N, -1)).reshape(-1, n)
     postures = np.full((len(spot), 8, n), np.nan)
     rows = np.flatnonzero(~np.isnan(spot).any(axis=1))
-    _, V, _ = newton.null_space(arm, task, spot[rows], np.repeat(target, MOST, axis=0)[rows])
+    _, V, _ = newton.null_space(arm, task, spot[rows], np.repeat(target, MAX_PLACES, axis=0)[rows])
     along, across = V[:, rank - 1], V[:, rank - 2]
     ways = np.stack([along, across, (along + across) / 2**0.5, (along - across) / 2**0.5], axis=1)
-    start = (spot[rows, None] + AWAY * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
-    goal = np.repeat(target, MOST, axis=0)[np.repeat(rows, 8)]
+    start = (spot[rows, None] + OTHER_SIDE * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
+    goal = np.repeat(target, MAX_PLACES, axis=0)[np.repeat(rows, 8)]
     landed, size = newton.correct(arm, task, start, goal, steps=10)
     # a posture that falls back to where it began lies on both self-motions, nearly, and tells of neither
-    back = np.abs(newton.difference(arm, landed, np.repeat(spot[rows], 8, axis=0))).max(axis=1) < 0.5 * AWAY
+    back = np.abs(newton.difference(arm, landed, np.repeat(spot[rows], 8, axis=0))).max(axis=1) < 0.5 * OTHER_SIDE
     postures[rows] = np.where((back | (size > tol.SEED))[:, None], np.nan, landed).reshape(-1, 8, n)
     return postures.reshape(N, -1, n)
 
 
 def _distinct_places(arm: Arm, place: Array, second: Array) -> Array:
-    """Of places (N, P, n) the `MOST` with the smallest second singular values (N, P), each crossing once; else nan."""
-    distinct = np.full((len(place), MOST, arm.n), np.nan)
+    """Of places (N, P, n) `MAX_PLACES` with the least second singular values (N, P), each crossing once; else nan."""
+    distinct = np.full((len(place), MAX_PLACES, arm.n), np.nan)
     for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
         crossing = np.flatnonzero(np.isfinite(second[k]))
         count = 0
         for centre in place[k, crossing[np.argsort(second[k, crossing], kind="stable")]]:
-            if not (np.abs(newton.difference(arm, distinct[k, :count], centre)).max(axis=1) < ONE).any():
+            if not (np.abs(newton.difference(arm, distinct[k, :count], centre)).max(axis=1) < SAME_PLACE).any():
                 distinct[k, count], count = centre, count + 1
-                if count == MOST:
+                if count == MAX_PLACES:
                     break
     return distinct
 

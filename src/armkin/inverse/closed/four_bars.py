@@ -47,12 +47,12 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
     # equal bars, or nearly: there are several postures in one line, and the curve may fall into others that cross
     ends = np.abs(np.stack([lowest - least, lowest - most, highest - least, highest - most]))
-    several = ((ends < tol.NEAR).sum(axis=0) > 1).any(axis=1)
+    several = ((ends < tol.NEAR_DEFECT).sum(axis=0) > 1).any(axis=1)
     # where all bars come so near to one line that the posture in it solves the target, two circuits are one
     least, most = least - tol.SOLUTION, most + tol.SOLUTION
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
     length = np.where(linkage.spherical[:, None], np.sin(linkage.bars), linkage.bars)
-    is_linkage[rows] = (linkage.planar | linkage.spherical) & (length > tol.NEAR).all(axis=1) & ~several
+    is_linkage[rows] = (linkage.planar | linkage.spherical) & (length > tol.NEAR_DEFECT).all(axis=1) & ~several
     two = np.flatnonzero(~reaches.all(axis=1))
     joint[rows[two]] = four[two, reaches[two].argmin(axis=1)]
     return is_linkage, joint

@@ -22,7 +22,7 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import joint_motion, rotation_about
 from armkin.model.units import radian_or_reach
 
-MOST = 5  # Newton steps, at most, from a candidate
+MAX_STEPS = 5  # Newton steps, at most, from a candidate
 SLOPE = 48.0  # error of the first step per distance from the class, where the arm is not near a singularity
 SENSES = {-1.0, 0.0, 1.0}  # factors of a joint in a sum: turned back, left out, turned forth
 ABSENT = 90.0  # squared residual of a root that is not real, in distances from the class: 9 on each side of it
@@ -49,7 +49,7 @@ class NewtonSteps:
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
         error = min(SLOPE * distance, 0.5)  # its square after a step, and so on
         least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
-        self.steps = min(least + 1, MOST)  # one more, and two thirds of those near a singularity need no other way
+        self.steps = min(least + 1, MAX_STEPS)  # one more, and two thirds of those near a singularity need no other way
         self.counted = task.name == "xyz" and not arm.prismatic.any()
         # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
         self.absent = None if self.counted or arm.prismatic.any() else ABSENT * distance

@@ -37,7 +37,7 @@ from armkin.model.rotation import inverse
 class Position:
     """``link[0] Z1 link[1] Z2 link[2] Z3 tip``, three joints, revolute or prismatic, any geometry."""
 
-    def __init__(self, chain: Chain, tip: Array, tolerance: float = tol.EXACT, near: float = tol.NEAR) -> None:
+    def __init__(self, chain: Chain, tip: Array, tolerance: float = tol.EXACT, near: float = tol.NEAR_DEFECT) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm].
 
         tolerance: what still counts as a special case. `close` says that the arm is farther from one than that,

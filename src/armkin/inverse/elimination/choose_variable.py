@@ -26,7 +26,7 @@ from armkin.model.rotation import inverse
 
 PSI = (0.7321, -1.1879)  # offsets [rad] of the hidden joint; arbitrary, but never where people put their arms
 SAMPLES = 11  # random poses on which roles are compared
-MANY = 0.3  # share of poses left open from which on other roles are tried
+OPEN_PART = 0.3  # share of poses left open from which on other roles are tried
 STEEP = 30.0  # norm of the inverse Jacobian above which a posture says little of a role
 STARTS = 20  # random postures from which a pose of a kind is sought, for each that is wanted
 # log10 of a role's raw error: nothing better needed, good enough, unfit
@@ -105,8 +105,8 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
         if _enough_roles(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
-    if not redundant and (rated[0].error >= HEALTHY or rated[0].left_open > MANY):  # beside a spherical wrist, say
-        for slot, hidden in _WIDE:
+    if not redundant and (rated[0].error >= HEALTHY or rated[0].left_open > OPEN_PART):  # beside a spherical wrist, say
+        for slot, hidden in _WIDE_SEARCH:
             rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
         rated.sort(key=lambda rating: rating.cost)
     return Elimination(closed, _pencil_sequence(closed, rated), rated[0].error)
@@ -146,7 +146,7 @@ def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...
     rated = [_rate(closed, pencil.role, q, goal) for pencil in usual if pencil.psi == PSI[0]]
     if rated[0].error < HEALTHY:
         return elimination.plans
-    for slot, hidden in _WIDE:
+    for slot, hidden in _WIDE_SEARCH:
         rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
         if len([rating for rating in rated if rating.error < EXCELLENT]) >= 3:
             break
@@ -190,13 +190,13 @@ _SEARCH: list[tuple[int, tuple[int, ...]]] = [
     *((slot, (1, 2)) for slot in (1, 0, 5)),
     *((slot, (0, 1, 2)) for slot in (2, 3, 4)),
 ]
-_WIDE = _SEARCH[:6]
+_WIDE_SEARCH = _SEARCH[:6]
 
 
 def _enough_roles(rated: list[_Rating], redundant: bool, last: bool) -> bool:
     """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
     quick ones are all known, any that is healthy."""
-    sound = [one for one in rated if one.error < EXCELLENT and one.left_open < MANY and one.pencil.size <= 16]
+    sound = [one for one in rated if one.error < EXCELLENT and one.left_open < OPEN_PART and one.pencil.size <= 16]
     if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
         return True
     tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)

@@ -26,11 +26,11 @@ from armkin.model.rotation import joint_motion
 SIZE = 15  # features of a line
 _P, _L = slice(0, 3), slice(3, 6)
 _M, _W = slice(8, 11), slice(11, 14)
-_PP, _PL, _ONE = 6, 7, 14
+_PP, _PL, _CONSTANT = 6, 7, 14
 
 Z_AXIS: Array = np.zeros(SIZE)
 """f(o, z): the features of a frame's own z axis (point 0, direction e3)."""
-Z_AXIS[[5, _ONE]] = 1.0
+Z_AXIS[[5, _CONSTANT]] = 1.0
 
 
 def features(p: Array, direction: Array) -> Array:
@@ -49,7 +49,7 @@ def features(p: Array, direction: Array) -> Array:
     for i, j, k in ((8, 1, 2), (9, 2, 0), (10, 0, 1)):  # p x l: np.cross takes ten times as long for one line
         numbers[..., i] = p[..., j] * direction[..., k] - p[..., k] * direction[..., j]
     numbers[..., _W] = square[..., None] * direction - 2 * along[..., None] * p
-    numbers[..., _ONE] = 1.0
+    numbers[..., _CONSTANT] = 1.0
     return numbers
 
 
@@ -70,10 +70,10 @@ def rep(motion: Array) -> Array:
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         cross_R[..., i, :] = t[..., j, None] * R[..., k, :] - t[..., k, None] * R[..., j, :]
     matrix[..., _P, _P] = matrix[..., _L, _L] = matrix[..., _M, _M] = matrix[..., _W, _W] = R
-    matrix[..., _P, _ONE] = t
+    matrix[..., _P, _CONSTANT] = t
     matrix[..., _PP, _P] = 2 * t_R
-    matrix[..., _PP, _ONE] = t_t
-    matrix[..., _PP, _PP] = matrix[..., _PL, _PL] = matrix[..., _ONE, _ONE] = 1.0
+    matrix[..., _PP, _CONSTANT] = t_t
+    matrix[..., _PP, _PP] = matrix[..., _PL, _PL] = matrix[..., _CONSTANT, _CONSTANT] = 1.0
     matrix[..., _PL, _L] = t_R
     matrix[..., _M, _L] = cross_R
     matrix[..., _W, _M] = -2 * cross_R

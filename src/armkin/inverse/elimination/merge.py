@@ -9,7 +9,7 @@ from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.inverse.elimination.polish import pose_error, tip
 from armkin.inverse.numeric import tolerances as tol
 
-MOST = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
+MAX_ANSWERS = 16  # isolated answers a 6-joint chain can have (Primrose 1986)
 
 # A projection of the joint circles that tells different answers apart: it orders a pose's answers, the
 # same way every time, and shows which of them can be equal.
@@ -87,10 +87,10 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
-        same = (distance < np.maximum(tol.ALIKE, reach)) | (halfway < blur)
+        same = (distance < np.maximum(tol.SAME_ANSWER, reach)) | (halfway < blur)
         worse = residual[second] > residual[first]
         keep[np.where(worse, second, first)[same]] = False
-        merged[pose[first[same & (distance > 1e-2 * tol.ALIKE)]]] = True
+        merged[pose[first[same & (distance > 1e-2 * tol.SAME_ANSWER)]]] = True
     return rows_of(answers, keep), merged
 
 
@@ -101,13 +101,13 @@ def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
     these the 16 furthest from singularities are given.
     """
     number = np.bincount(answers.pose, minlength=count)
-    near_singular = number > MOST
+    near_singular = number > MAX_ANSWERS
     near_singular[answers.pose[answers.weakness > tol.ILL]] = True
-    if number.max(initial=0) > MOST:
+    if number.max(initial=0) > MAX_ANSWERS:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = numbers_within(number)
-        answers = rows_of(answers, rank < MOST)
-    return _table(answers, count, MOST), near_singular
+        answers = rows_of(answers, rank < MAX_ANSWERS)
+    return _table(answers, count, MAX_ANSWERS), near_singular
 
 
 def best_answers(answers: Answers, count: int, most: int) -> Array:

@@ -13,7 +13,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 
 LARGEST_STEP = 0.5  # Newton step [rad, scaled length], at most: a longer one leaves the region it was made for
-MORE = 3  # further Newton steps for candidates that are close but have not converged
+SLOW_STEPS = 3  # further Newton steps for candidates that are close but have not converged
 
 
 class Polished(NamedTuple):
@@ -103,7 +103,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         link, prismatic: the chain, scaled to about unit length.
         q: (M, 6) first guesses, scaled.
         goal: (M, 4, 4), scaled.
-        steps: at most so many steps, and undamped ones `MORE` on slow ways to an answer; what has converged drops out.
+        steps: at most so many, and `SLOW_STEPS` undamped ones on slow ways to an answer; what has converged drops out.
         damped: damp all but the last two steps by the residual, for poor guesses and weak Jacobians.
     """
     count = q.shape[0]
@@ -112,7 +112,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     best, residual = value.copy(), np.full(count, np.inf)
     weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
     active, last = np.arange(count), np.zeros(count)
-    most = steps if damped else steps + MORE
+    most = steps if damped else steps + SLOW_STEPS
     for step in range(most + 1):
         frame, joints = tip(link, prismatic, value)
         error, size = pose_error(frame, target)
@@ -136,7 +136,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
                 fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
             inverse[index] = fresh
-        open_ = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOWLY)
+        open_ = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOW_DISTANCE)
         going = np.flatnonzero(open_)
         if step == most or going.size == 0:
             break

@@ -18,10 +18,10 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
 from armkin.model.rotation import inverse
 
-STEADY = 1e5  # size of a pencil's entries up to which its simple roots and their vectors are known well
-ROUGH = 1e6  # size of a pencil's entries above which it is badly scaled
-SINGULAR = 1e9  # size of a singular pencil's answer to a side that no arm is made for
-ONE = 1e3  # quotient of the sine between two roots' vectors and their distance, up to which they have one vector
+STEADY_ENTRY = 1e5  # size of a pencil's entries up to which its simple roots and their vectors are known well
+ROUGH_ENTRY = 1e6  # size of a pencil's entries above which it is badly scaled
+SINGULAR_ENTRY = 1e9  # size of a singular pencil's answer to a side that no arm is made for
+DOUBLE_SLOPE = 1e3  # quotient of the sine between two roots' vectors and their distance, up to which they are one
 _ANYWHERE: Array = np.random.default_rng(2).standard_normal(24)  # right-hand side that no arm is made for
 
 
@@ -100,12 +100,12 @@ def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
     G, anywhere = solved[:, :, :count], solved[:, :, count]
     size = np.abs(G).max(axis=(1, 2))
     # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
-    rough = (size > ROUGH) | (np.abs(anywhere).max(axis=1) > SINGULAR)
+    rough = (size > ROUGH_ENTRY) | (np.abs(anywhere).max(axis=1) > SINGULAR_ENTRY)
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((len(G), 2 * r + 2 * w, 2 * r + 2 * w))
     companion[:, :lead] = -G
     companion[:, lead:, 2 * r : lead] = np.eye(w)
-    return companion, rough, size < STEADY
+    return companion, rough, size < STEADY_ENTRY
 
 
 def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _Candidates:
@@ -174,7 +174,7 @@ def _root_gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], i
     apart = away[row, twin]
     twin_vectors = vectors[row, :, twin]
     sine = np.linalg.norm(twin_vectors - v * (v.conj() * twin_vectors).sum(axis=1, keepdims=True), axis=1)
-    double = (apart < tol.TWIN_ROOTS) & (sine < ONE * apart)
+    double = (apart < tol.TWIN_ROOTS) & (sine < DOUBLE_SLOPE * apart)
     pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, index].imag != 0) & (sine * apart > tol.REAL_PAIR)
     away[row, twin] = np.where(double | pair, np.inf, apart)
     return np.asarray(away.min(axis=1))

@@ -23,8 +23,8 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import joint_motion, rotation_about
 
-FREE = 0.7321  # value [rad] at which a free joint is held
-OTHERS = (0.0, 1.3, 2.9)  # values [rad], beside FREE, at which the slides' directions are compared
+FREE_ANGLE = 0.7321  # value [rad] at which a free joint is held
+OTHER_ANGLES = (0.0, 1.3, 2.9)  # values [rad], beside FREE_ANGLE, at which the slides' directions are compared
 
 
 def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
@@ -52,7 +52,7 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
     middle = A[1] @ rotation_about(2, q2) @ A[2]
     q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(middle[..., 1, 2], middle[..., 0, 2])
-    q1[free] = FREE
+    q1[free] = FREE_ANGLE
 
     def whole(q1: Array, rows: Bool) -> tuple[Array, Array]:
         """Solutions (K, 2, 6) of some goals for values of q1 (K, 2), and the weakest of the slides' directions (K,)."""
@@ -63,7 +63,7 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     q, weakest = whole(q1, np.ones(len(goal), bool))
     sure = ~((square < tol.NEARLY_COPLANAR**2) & (weakest < tol.NEARLY_COPLANAR)) | free
     sure[free] = weakest[free] > tol.NEARLY_COPLANAR
-    for value in OTHERS if free.any() else ():
+    for value in OTHER_ANGLES if free.any() else ():
         sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < tol.NEARLY_COPLANAR
     return q, sure
 

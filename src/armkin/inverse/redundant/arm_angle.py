@@ -25,7 +25,7 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
 
 TURN = 2 * np.pi  # whole turn [rad]
-EVEN = 24  # samples of a turn besides the roots
+EVEN_SAMPLES = 24  # samples of a turn besides the roots
 STEPS = 8  # steps of the golden section: the kinks of the motion from near are samples, and a parabola ends it
 JOINTS = (0, 1, 2), (4, 5, 6)  # numbers of the joints of the shoulder and of the wrist
 
@@ -163,7 +163,7 @@ def _special_angles(srs: ArmAngle, R: Array, near: Array) -> Array:
                 else:
                     f = e[:, 0, 2] * s - e[:, 1, 2] * c if i == 0 else e[:, 2, 0] * s + e[:, 2, 1] * c
                     angles.append(_roots(f[1], f[2], -f[0]))
-    angles.append(np.broadcast_to(np.arange(EVEN) * (TURN / EVEN), (len(near), EVEN)))
+    angles.append(np.broadcast_to(np.arange(EVEN_SAMPLES) * (TURN / EVEN_SAMPLES), (len(near), EVEN_SAMPLES)))
     return np.sort(np.remainder(np.concatenate(angles, axis=1), TURN), axis=1)
 
 

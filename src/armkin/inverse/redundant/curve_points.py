@@ -18,7 +18,7 @@ from armkin.inverse.numeric.newton import nudged
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
-FARTHEST = 0.3  # length [rad, reaches], at most, of one step of Newton's method
+MAX_STEP = 0.3  # length [rad, reaches], at most, of one step of Newton's method
 NEWTON = 4  # steps of Newton's method onto the curve
 AT_ONCE = 1000  # postures that Newton's method works on at once: they stay in the cache
 
@@ -64,7 +64,7 @@ def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: flo
         step = x[:, :, 0]
         tangent[part] = x[:, :, 1] / np.sqrt((x[:, :, 1] ** 2).sum(axis=1, keepdims=True))
         longest = np.abs(step).max(axis=1)
-        q[part] += step * np.minimum(1.0, FARTHEST / np.maximum(longest, FARTHEST))[:, None] * unit
+        q[part] += step * np.minimum(1.0, MAX_STEP / np.maximum(longest, MAX_STEP))[:, None] * unit
         size[part] = np.where(np.isnan(longest), np.inf, longest)
         going = going[~(size[part] < enough)]  # its square is left
     return Points(q, tangent, size)
@@ -101,4 +101,4 @@ class Ways(NamedTuple):
     def follow(self, follower: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
         miss = newton.misses(follower.arm, follower.free.task, self.at(follower, 0.5), follower.target[row])
-        return miss < tol.ROUGHLY
+        return miss < tol.MID_MISS

@@ -26,7 +26,7 @@ from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.solvers.redundant import Redundancy, arm_without, nearly_closed
 
 PLANES = 60  # values of the joint at which the target is solved
-BETWEEN = 12  # parts of the way between two planes, where answers may be that neither plane has
+WAY_PARTS = 12  # parts of the way between two planes, where answers may be that neither plane has
 VALUES = 0.05, 0.05 + np.pi / 2  # angles [rad] at which the other joint is held: the remaining ones are not special
 SECANTS = 4  # steps along a cubic to where the other joint has such a value
 ON_CURVE = 0.02  # distance [rad, reaches] of an answer from a curve up to which it is on it
@@ -91,7 +91,7 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
         more, extra = np.append(more, whose), np.append(extra, postures, axis=0)
         row, t = np.append(row, more), np.append(t, extra[:, guide.joint])
         beside = source.candidates(more, t[N * PLANES :])
-        q, solving = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR
+        q, solving = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR_DEFECT
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
@@ -110,13 +110,13 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
 def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
     tells: of a short curve, whose joint cannot be held where it turns back."""
-    width, part = t[1] - t[0], np.arange(1, BETWEEN) / BETWEEN
+    width, part = t[1] - t[0], np.arange(1, WAY_PARTS) / WAY_PARTS
     misses = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
     row, k = np.nonzero(may_turn_back(misses, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
     q, missed = source.candidates(row, values)
     best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
-    place, branch = np.nonzero(missed[best] < tol.NEAR)
+    place, branch = np.nonzero(missed[best] < tol.NEAR_DEFECT)
     row, q = row[best[place]], q[best[place], branch]
     q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
     good = np.flatnonzero(miss < tol.SAME_SEED)

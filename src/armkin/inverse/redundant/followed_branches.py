@@ -16,10 +16,10 @@ from armkin.inverse.redundant.other_joints import Follower, over_a_turn
 from armkin.inverse.redundant.samples import Changes, Runs, Summary, place_between, summary_of_samples, value_at
 from armkin.inverse.tasks.task import distance
 
-EVEN = 180  # even samples of a turn of the redundant joint, besides all places where something may change
+EVEN_SAMPLES = 180  # even samples of a turn of the redundant joint, besides all places where something may change
 SAMPLES = 360  # samples of a turn where these places are not known
-CLOSER = 4  # factor on the number of values where branches may be between two samples
-FINER = 48  # factor on the number of values where no sample had an answer
+CLOSER_FACTOR = 4  # factor on the number of values where branches may be between two samples
+FINER_FACTOR = 48  # factor on the number of values where no sample had an answer
 STEPS = 16  # steps of the golden section
 
 
@@ -63,7 +63,7 @@ class Followed(NamedTuple):
 def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
     targets those are (N,)."""
-    shown = summary_of_samples(follower, over_a_turn(EVEN), angles)
+    shown = summary_of_samples(follower, over_a_turn(EVEN_SAMPLES), angles)
     changes = shown.crossed.at, shown.gone.at
     legal, present = ends = [place_between(shown.t, change, angles) for change in changes]
     crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(shown.crossed.rooms).any(axis=1))
@@ -85,7 +85,7 @@ def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     if finer == 1:
         within_reach = distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
         lost = shown.lost & (follower.arm.prismatic.any() | within_reach)
-        for more, asked_again in ((CLOSER, shown.hidden & ~lost), (FINER, lost)):
+        for more, asked_again in ((CLOSER_FACTOR, shown.hidden & ~lost), (FINER_FACTOR, lost)):
             again = np.flatnonzero(asked_again)
             at_once = max(SAMPLES // more, 1)
             for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):

@@ -30,13 +30,13 @@ from armkin.model.arm import Arm
 Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets that a formula solves at once: they stay in the cache
 SAFE = 4.0  # safety factor on the bend that the samples show
-NEAR = 0.3  # distance [rad] of a limit within which a branch can come to it before the next sample
-FAST = 0.2  # movement [rad] from one sample to the next that is fast: beside a straight shoulder or wrist
-BESIDE = 0.2  # distance [rad] beyond its limits at which a branch may still be legal between two samples
-ASIDE = 0.3  # distance [rad] beyond its limits, as BESIDE, near a branch's end
+LIMIT_DISTANCE = 0.3  # distance [rad] of a limit within which a branch can come to it before the next sample
+FAST_STEP = 0.2  # movement [rad] from one sample to the next that is fast: beside a straight shoulder or wrist
+LIMIT_SLACK = 0.2  # distance [rad] beyond its limits at which a branch may still be legal between two samples
+END_SLACK = 0.3  # distance [rad] beyond its limits, as LIMIT_SLACK, near a branch's end
 PARTS = 8  # parts of the way between two samples
-MOST = 16  # ways between two samples, at most, that are refined for a target
-CLOSER = MOST * (PARTS - 1)  # values solved, at most, on the refined ways of a target
+MAX_WAYS = 16  # ways between two samples, at most, that are refined for a target
+MAX_VALUES = MAX_WAYS * (PARTS - 1)  # values solved, at most, on the refined ways of a target
 
 
 class Sampled(NamedTuple):
@@ -191,7 +191,7 @@ class Follower(NamedTuple):
 
 
 def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[int, ...], t: Array) -> Array:
-    """Values of the joint between t (K,) that shall be asked, too (S, CLOSER); inf where there are fewer.
+    """Values of the joint between t (K,) that shall be asked, too (S, MAX_VALUES); inf where there are fewer.
 
     columns: of each joint its values on its own branch axes before targets' samples (S K,); missed: squared.
     """
@@ -215,13 +215,13 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
     gone = ~present & ~_next_sample(present)
     ends = present != _next_sample(present)
     hidden = gone & _may_touch(np.sqrt(by_target(missed)))
-    limits = ~gone & ~ends & (may | (crossed > 1)) & (room > -BESIDE)
-    often = (limits | (ends & (room > -ASIDE)) | hidden).sum(axis=tuple(range(len(axes))))
-    most = np.argsort(-often, axis=1, kind="stable")[:, :MOST]
+    limits = ~gone & ~ends & (may | (crossed > 1)) & (room > -LIMIT_SLACK)
+    often = (limits | (ends & (room > -END_SLACK)) | hidden).sum(axis=tuple(range(len(axes))))
+    most = np.argsort(-often, axis=1, kind="stable")[:, :MAX_WAYS]
     begin = np.where(np.take_along_axis(often, most, axis=1) > 0, t[most], np.inf)
     width = np.diff(t, append=t[0] + 2 * np.pi)[most]
     values = begin[:, :, None] + width[:, :, None] * (np.arange(1, PARTS) / PARTS)
-    return np.asarray(values.reshape(-1, CLOSER))
+    return np.asarray(values.reshape(-1, MAX_VALUES))
 
 
 def _next_sample(x: NDArray[Any]) -> NDArray[Any]:
@@ -231,8 +231,8 @@ def _next_sample(x: NDArray[Any]) -> NDArray[Any]:
 
 def _may_touch(left: Array) -> Bool:
     """Whether what is left (..., K) may come to nothing and back between a sample and the next."""
-    touches, values, K = np.abs(_next_sample(left) - left) > FAST, left.ravel(), left.shape[-1]
-    near = np.flatnonzero(np.abs(values) < NEAR)
+    touches, values, K = np.abs(_next_sample(left) - left) > FAST_STEP, left.ravel(), left.shape[-1]
+    near = np.flatnonzero(np.abs(values) < LIMIT_DISTANCE)
     k = near % K
     before, first, second, behind = (values[near - k + (k + offset) % K] for offset in (-1, 0, 1, 2))
     step = second - first

@@ -34,7 +34,7 @@ from armkin.model.limits import outside_limits
 
 POOL = 32_768  # postures within limits that starts are chosen from
 ON_LIMIT = 0.25  # share of the pool's joints that are on a limit
-NEAREST = 1024  # postures of the pool that are nearest to a target's position
+NEAREST_POSTURES = 1024  # postures of the pool that are nearest to a target's position
 STARTS = 256  # starts of a target: those of the nearest postures that are farthest from each other
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
@@ -161,7 +161,7 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     pool, tips = _pool(arm)
     point = target[:, :3, 3]
     apart = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
-    nearest = pool[np.argpartition(apart, NEAREST, axis=1)[:, :NEAREST]]
+    nearest = pool[np.argpartition(apart, NEAREST_POSTURES, axis=1)[:, :NEAREST_POSTURES]]
     clipped = np.clip(near, arm.lower, arm.upper)[:, None]
     starts = np.concatenate([clipped, _farthest_apart(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)

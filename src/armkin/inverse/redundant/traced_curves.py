@@ -21,9 +21,9 @@ from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
 HALVINGS = 6  # halvings of the way between two answers
-APART = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
-LONGEST = 0.3  # longest step [rad, reaches] along a curve
-ASIDE = 0.3  # distance, as a share of a step, that Newton's method moves a point sideways at most
+ARC_LENGTH = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
+MAX_STEP = 0.3  # longest step [rad, reaches] along a curve
+SIDE_SHARE = 0.3  # distance, as a share of a step, that Newton's method moves a point sideways at most
 TRIES = 100  # steps, at most, of one arc
 ROUNDS = 20  # arcs, at most, of one curve, each to the next plane
 
@@ -60,7 +60,7 @@ class _Curves:
             ways = Ways.between(follower, first, last._replace(tangent=-last.tangent))
             size = np.sqrt((ways.chord**2).sum(axis=1))
             apart = (ways.chord * first.tangent).sum(axis=1) < 0
-            apart |= ((ways.chord * last.tangent).sum(axis=1) > 0) | (size > APART)
+            apart |= ((ways.chord * last.tangent).sum(axis=1) > 0) | (size > ARC_LENGTH)
             row = self.nodes.row[a >> 1]
             good = ~apart & ways.follow(follower, row)
             links.append((a[good], b[good], whose[good]))
@@ -72,7 +72,7 @@ class _Curves:
             middle = rows_of(ways, left).at(follower, 0.5)
             points = onto_curves(follower, row[left], middle, ways.chord[left] / size[left, None], tol.SAME_SEED)
             aside = newton.wrapped_distance(follower.arm, points.q, middle)
-            good = (points.step < tol.SAME_SEED) & (aside < ASIDE * size[left])
+            good = (points.step < tol.SAME_SEED) & (aside < SIDE_SHARE * size[left])
             failed[whose[left[~good]]] = True
             left = left[good]
             middles = self._add(Nodes(row[left], np.full(len(left), -1), rows_of(points, good)))
@@ -157,7 +157,7 @@ class _Curves:
         unit = radian_or_reach(follower.arm)
         row, slab, current = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
         behind = (slab + 1) % self.planes.counts[row]
-        low, h = values[row, slab], np.full(len(ray), LONGEST)
+        low, h = values[row, slab], np.full(len(ray), MAX_STEP)
         wide = np.remainder(values[row, behind] - low, 2 * np.pi)
         end, plane = Points(*(x.copy() for x in current)), np.full(len(ray), -1)
         passed, going = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
@@ -167,8 +167,8 @@ class _Curves:
             then = onto_curves(follower, row[going], ahead, begin.tangent, tol.SAME_SEED)
             way = Ways.between(follower, begin, then)
             aside = np.sqrt(((way.chord - step * begin.tangent) ** 2).sum(axis=1))
-            good = (then.step < tol.SAME_SEED) & (aside < ASIDE * h[going]) & way.follow(follower, row[going])
-            h[going] = np.where(good, np.minimum(1.5 * h[going], LONGEST), 0.5 * h[going])
+            good = (then.step < tol.SAME_SEED) & (aside < SIDE_SHARE * h[going]) & way.follow(follower, row[going])
+            h[going] = np.where(good, np.minimum(1.5 * h[going], MAX_STEP), 0.5 * h[going])
             middle = low[going] + 0.5 * wide[going]
             depth, before = (wrap_angle(points.q[:, j] - middle) for points in (then, begin))
             left = good & (np.abs(depth) >= 0.5 * wide[going]) & (np.abs(depth - before) > tol.TINY)

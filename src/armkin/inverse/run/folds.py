@@ -22,9 +22,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.model.units import radian_or_reach
 
-SURELY = 1.02  # factor on SOLUTION or its inverse: what lies between the two bounds is looked at closely
+SURE_FACTOR = 1.02  # factor on SOLUTION or its inverse: what lies between the two bounds is looked at closely
 SYMMETRIC = 0.2  # difference, relative to their size, of the slopes at a pair's ends at most
-APART = 10.0 * tol.SAME  # distance [rad, reaches] of two branches below which they are looked at closely
+PAIR_DISTANCE = 10.0 * tol.SAME  # distance [rad, reaches] of two branches below which they are looked at closely
 
 
 class Doubted(NamedTuple):
@@ -90,7 +90,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     if not decided[k].all():  # no Jacobians of those
         return _second_of_pairs(goals, doubted, near_roots, decided)
     i, j, way = i[close], j[close], way[close]
-    double = np.abs(way).max(axis=1) < APART
+    double = np.abs(way).max(axis=1) < PAIR_DISTANCE
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
     partners[i[double]], weak[i[double]] = 0, True  # of double roots the first stands for both
@@ -133,21 +133,21 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
     g along u is zero at both ends; a curve that keeps all other numbers of the target has the slope 1 / (v' J^-1 u).
     """
     far = np.sqrt((way * way).sum(axis=1))
-    v = _tangents(way / np.maximum(far, APART)[:, None], first)
+    v = _tangents(way / np.maximum(far, PAIR_DISTANCE)[:, None], first)
     u = _unit(v @ first)
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, lost_second = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
         rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
         size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
         # the fourth derivative is taken for as large as that of the sharpest fold
-        plain = _one_direction_lost(first, lost) & (far > APART) & (uneven < SYMMETRIC * size)
-        alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURELY * tol.SOLUTION)
+        plain = _one_direction_lost(first, lost) & (far > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
+        alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
         # up to where the residual of two branches that meet may be 2 SOLUTION
         end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
         straight = 6.0 * uneven / far**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
         # the direction in which no joint moves the tool counts as well
         across = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
-        meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURELY)
+        meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURE_FACTOR)
     return np.asarray(alone), np.asarray(meet)
 
 
@@ -169,9 +169,9 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
         slope = np.abs(1.0 / (v @ lost)[:, 0, 0])
         ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
         bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
-        steep = slope**2 > SURELY * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
+        steep = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
         end = 4.0 * np.sqrt(tol.SOLUTION / bend)
-        flat = SURELY * slope**2 < 2.0 * tol.SOLUTION * (bend - tol.CURVATURE * end)
+        flat = SURE_FACTOR * slope**2 < 2.0 * tol.SOLUTION * (bend - tol.CURVATURE * end)
     one, square = _one_direction_lost(inverse, lost), beside.shape[2] == 0
     return np.asarray(one & (passed < tol.FOLD_WAY) & steep), np.asarray(one & (end < tol.FOLD_WAY) & flat & square)
 

@@ -22,9 +22,9 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.whole_turns import TURN, nearest_number
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.near_itself import COARSE, ROOM
+from armkin.inverse.singular.near_itself import COARSE_ROOM, ROOM
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.tasks.task import LARGEST, ROUNDED, rotation_check
+from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED, rotation_check
 from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
@@ -50,7 +50,7 @@ class OneTarget:
         self._run, self._off = runner.code.single_pose_function(), rotation_check().single_pose_function()
         self._joints = list(zip(arm.lower.tolist(), arm.upper.tolist(), arm.prismatic.tolist(), strict=True))
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
-        self._coarse = COARSE * arm.reach if self.orientation == "full" else 0.0
+        self._coarse = COARSE_ROOM * arm.reach if self.orientation == "full" else 0.0
         self._home_tip = self._point(*arm.home.tolist())
         self._close = [tol.THERE * unit for unit in radian_or_reach(arm).tolist()]
         output_axes, axes = runner.code.axes(), runner.axes
@@ -78,7 +78,7 @@ class OneTarget:
             if near.shape != (self._n,) or not np.isfinite(near).all():
                 return None
         goal, defect = target.ravel().tolist(), 0.0
-        if not math.isfinite(sum(goal)) or max(goal) > LARGEST or min(goal) < -LARGEST:
+        if not math.isfinite(sum(goal)) or max(goal) > MAX_TARGET or min(goal) < -MAX_TARGET:
             return None
         own_target = target.copy()
         if self.orientation == "full":
@@ -95,7 +95,7 @@ class OneTarget:
                     return None
                 own_target[3:] /= length
                 goal = own_target.tolist()
-        if self._slides and math.dist(point, self._base) > tol.FAR * self._reach:
+        if self._slides and math.dist(point, self._base) > tol.FAR_DISTANCE * self._reach:
             return None
         *values, miss, doubt, _ = self._run(*goal)
         if doubt if self._plain[-2] else any(doubt):

@@ -16,7 +16,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import replace_rows, rows_of, widen_columns
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
+from armkin.inverse.answers.batch import OWN_LABEL, Examined, Goals, Seeds
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -24,7 +24,7 @@ from armkin.inverse.singular import chains, curves, high_order_roots, meetings, 
 from armkin.inverse.singular.local_structure import beyond_folds, local_structure
 
 AT_ONCE = 128  # candidates from which on asking all together is cheaper than one after the other
-FEW = 24  # candidates of a target that are compared all with all
+FEW_CANDIDATES = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps with hardly any gain after which a candidate is left where it is
 
 # For targets (R, ...), preferred values (R, n) and whether branches seem lost (R,): more postures (R, M, n), their
@@ -224,16 +224,16 @@ class _Groups:
         # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
         pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, exact, np.inf)).argmin(axis=1)
-        leads = np.flatnonzero(label[k, b] == OWN)
+        leads = np.flatnonzero(label[k, b] == OWN_LABEL)
         pick[leads] = b[leads]
         self.chosen[k, pick] = unlisted
         self.curve[k, pick] = joints & moving[:, None]
         for array in (self.known, self.moves, self.place, self.ended, self.alone):
             array[k, pick] = array[k, b]
         if len(leads):  # named like the candidate of its group that is closest to it
-            alike = np.where(mine[leads] & (label[k[leads]] != OWN), motion[leads], np.inf)
+            alike = np.where(mine[leads] & (label[k[leads]] != OWN_LABEL), motion[leads], np.inf)
             twin = alike.argmin(axis=1)
-            label[k[leads], b[leads]] = np.where(np.isinf(alike.min(axis=1)), OWN, label[k[leads], twin])
+            label[k[leads], b[leads]] = np.where(np.isinf(alike.min(axis=1)), OWN_LABEL, label[k[leads], twin])
 
     def _inherit(self, k: Int, b: Int, alike: Bool) -> None:
         """Components (m, M) that a manifold begun at another of their candidates has as its own are that manifold.
@@ -280,7 +280,7 @@ class _Groups:
     def settle(self, missed: Bool, beyond: Bool) -> Examined:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
-        small = self.valid.shape[1] <= FEW
+        small = self.valid.shape[1] <= FEW_CANDIDATES
         # those that lose several directions when they lead; of many, those that lose one, too
         asking = ~self.asked & (self.lost.nullity < 2)
         if asking.any() and (small or asking.sum() <= AT_ONCE):
@@ -322,7 +322,7 @@ class _Groups:
             lost = self.lost.V[k, b], self.lost.nullity[k, b]
             surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])[0]]] = True
         listed = np.where(present[:, :, None], q[every, order], np.nan)
-        label = np.where(present, self.at.label[every, order], OWN)
+        label = np.where(present, self.at.label[every, order], OWN_LABEL)
         moved = np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1))
         return Examined(listed, present, label, status, self.free, missed, surface, moved, beyond)
 
@@ -334,7 +334,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     present, every = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
     order = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max(initial=0))]
     q = np.concatenate([near[:, None], seeds.q[every, order]], axis=1)
-    label = np.concatenate([np.full((K, 1), OWN), seeds.label[every, order]], axis=1)
+    label = np.concatenate([np.full((K, 1), OWN_LABEL), seeds.label[every, order]], axis=1)
     sure = np.concatenate([np.zeros((K, 1, n), bool), seeds.sure[every, order]], axis=1)
     loose = (seeds.loose & present)[every, order]
     simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & present)[every, order]], axis=1)

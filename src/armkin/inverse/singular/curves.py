@@ -19,10 +19,10 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 STEP = 0.3  # step [rad, reaches] along a curve
-MOST = 250  # steps, at most, along a curve
+MAX_STEPS = 250  # steps, at most, along a curve
 PASSED = 0.15  # share of a step: joint values this close to its chord are on the way; a curve is half as far off it
 BEND = 4.0  # length of a step, at most, in second smallest singular values
-OVER = 0.05  # step [rad, reaches] over a crossing
+CROSSING_STEP = 0.05  # step [rad, reaches] over a crossing
 STRAIGHT = 0.8  # cosine, at least, between the directions of two steps
 
 
@@ -73,7 +73,7 @@ class Curves:
         self.at[rows[good]], self._ahead[rows[good]] = landed[good], ahead[good] / cosine[good, None]
         self._pace[rows] = pace = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * pace)
         self._taken[rows] += 1
-        stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MOST
+        stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MAX_STEPS
         unsure = (second < tol.CROSSING) | (stuck & (size < tol.OFF_CURVE)) | long
         step = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
         home = step.passes(arm, self._start[rows], np.arange(len(rows)))
@@ -90,7 +90,7 @@ def curve_directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array
 
 def _longest_steps(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
-    return np.asarray(np.where(second < tol.CROSSING, OVER, np.minimum(STEP, BEND * second)))
+    return np.asarray(np.where(second < tol.CROSSING, CROSSING_STEP, np.minimum(STEP, BEND * second)))
 
 
 def _next_directions(V: Array, second: Array, last: Array) -> Array:

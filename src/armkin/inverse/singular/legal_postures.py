@@ -23,7 +23,7 @@ from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-FINE = np.deg2rad(0.1)  # step [rad] between the postures of a self-motion that are looked at
+FINE_STEP = np.deg2rad(0.1)  # step [rad] between the postures of a self-motion that are looked at
 
 
 def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
@@ -112,7 +112,7 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     pieces = [np.empty((0, arm.n))]
     while walk.going.any():
         step = walk.step()
-        count = max(int(np.ceil(np.abs(step.chord).max() / FINE)), 1)
+        count = max(int(np.ceil(np.abs(step.chord).max() / FINE_STEP)), 1)
         share = (np.arange(count) / count)[:, None, None]
         between = (step.before + share * step.chord * unit).reshape(-1, arm.n)
         goal = np.repeat(target[None], len(between), axis=0)

@@ -25,7 +25,7 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev nod
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # factor by which a span is shortened where a curve turns away within it
 SHRINKS = 3  # times that a span is shortened at most
-LONGER = 0.25, 2.0  # length of a span, at least and at most, relative to the last one
+LENGTH_RATIO = 0.25, 2.0  # length of a span, at least and at most, relative to the last one
 STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(tol.FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
@@ -34,8 +34,8 @@ BACK = 5  # steps, at most, back onto the curve
 SERIES = 0.01  # distance [rad, reaches] up to which a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
-FINE = np.linspace(0.0, 1.0, 33)[:, None]  # parameters of a component at which its slope is compared
-FINER = np.linspace(0.0, 1.0, 129)[:, None]  # parameters of an interval where a component ends, or between two
+FINE_GRID = np.linspace(0.0, 1.0, 33)[:, None]  # parameters of a component at which its slope is compared
+FINER_GRID = np.linspace(0.0, 1.0, 129)[:, None]  # parameters of an interval where a component ends, or between two
 
 
 class Structure(NamedTuple):
@@ -225,7 +225,7 @@ def _polynomials(
     with np.errstate(invalid="ignore", divide="ignore"):
         off = np.maximum(last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION))
         # the last coefficients grow with the span to that power
-        longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LONGER), LONGER[0])
+        longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LENGTH_RATIO), LENGTH_RATIO[0])
         on &= off < 1.0
     power = np.tensordot(_POWERS, chebyshev, axes=1)
     return np.asarray(on), longer, _crossed_by_none(inverse, span), power[:, :, :n], power[:, :, n:]
@@ -320,7 +320,7 @@ def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     ends[rows] = True
     low, high = POINTS[np.maximum(first - 1, 0)], POINTS[first]
     for _ in range(2 if len(rows) else 0):
-        between = low + FINER * (high - low)
+        between = low + FINER_GRID * (high - low)
         beyond = np.linalg.norm(_values(g[:, rows], between[1:]), axis=2) > tol.SOLUTION
         beyond[-1] = True
         first = beyond.argmax(axis=0)
@@ -334,7 +334,7 @@ def _decide(curve: Structure, rows: Int) -> None:
     g, x, span = curve.g[:, rows], curve.x[:, rows], curve.span[rows]
     (low, high), (below, above) = _ends_of_components(g)
     low = -low
-    s = low + FINE * (high - low)  # (points, M)
+    s = low + FINE_GRID * (high - low)  # (points, M)
     way = _values(x, s)
     curve.least[rows], curve.most[rows] = way.min(axis=0), way.max(axis=0)
     extent = curve.most[rows] - curve.least[rows]

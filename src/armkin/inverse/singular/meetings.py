@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import OWN, Goals
+from armkin.inverse.answers.batch import OWN_LABEL, Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.self_motions import STEP, null_directions, on_surface, pull_back, push_along
@@ -23,8 +23,8 @@ from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
 BOW = 0.1  # distance of a curve from its chord, at most, relative to the chord's length
-AROUND = 256  # directions in a plane, each of which stands for its opposite, too
-ACROSS = 64  # points along each edge of a cube whose sides hold directions in space
+PLANE_DIRECTIONS = 256  # directions in a plane, each of which stands for its opposite, too
+EDGE_POINTS = 64  # points along each edge of a cube whose sides hold directions in space
 SAMPLE = 61  # stride of the directions asked first: most curves have one below what all must exceed
 ALL_ROUND = 5.0 * tol.BENT  # curvature [1/rad] in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
@@ -53,7 +53,7 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     whose, row = label[k[first], b[first]][meet], row[meet]
     place = np.arange(len(row)) - np.searchsorted(row, row)
     shape = len(q), int(place.max(initial=-1)) + 1
-    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN), np.full(shape, np.inf)
+    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN_LABEL), np.full(shape, np.inf)
     more[row, place], labels[row, place] = ends, whose
     sizes[row, place] = newton.misses(arm, task, ends, target[row])
     resting = np.zeros((len(q), q.shape[1] + shape[1]), bool)
@@ -66,13 +66,13 @@ def _directions(k: int) -> tuple[Array, Array, float]:
     """Directions (P, k) in a plane or in space, their coordinates' products (k (k + 1) / 2, P), and how far [rad] any
     direction is from one of these at most."""
     if k == 2:
-        turn = np.linspace(0.0, np.pi, AROUND, endpoint=False)
-        unit, far = np.stack([np.cos(turn), np.sin(turn)], axis=1), np.pi / AROUND
+        turn = np.linspace(0.0, np.pi, PLANE_DIRECTIONS, endpoint=False)
+        unit, far = np.stack([np.cos(turn), np.sin(turn)], axis=1), np.pi / PLANE_DIRECTIONS
     else:
-        side = np.linspace(-1.0, 1.0, ACROSS)
-        face = np.stack([*np.meshgrid(side, side), np.ones((ACROSS, ACROSS))], axis=2).reshape(-1, 3)
+        side = np.linspace(-1.0, 1.0, EDGE_POINTS)
+        face = np.stack([*np.meshgrid(side, side), np.ones((EDGE_POINTS, EDGE_POINTS))], axis=2).reshape(-1, 3)
         unit = np.concatenate([np.roll(face, i, axis=1) for i in range(3)])
-        unit, far = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (ACROSS - 1)
+        unit, far = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (EDGE_POINTS - 1)
     return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)]), far
 
 

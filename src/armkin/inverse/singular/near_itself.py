@@ -24,7 +24,7 @@ from armkin.model.units import radian_or_reach
 
 AT_ONCE = 4096  # targets whose branches are compared with `near` together
 ROOM = 2.0 * tol.SOLUTION  # distance [reaches] of the tool from a target that `near` might solve: twice, for rounding
-COARSE = 1e4 * ROOM  # distance [reaches], as ROOM, from a pose rounded to six digits where its rotation does not tell
+COARSE_ROOM = 1e4 * ROOM  # distance [reaches] from a pose rounded to six digits where its rotation does not tell
 ROUNDED = 1.001 * tol.SOLUTION  # residual, at least, that solves a rounded target
 
 

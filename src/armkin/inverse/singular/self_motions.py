@@ -20,7 +20,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-ALONG = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
+LINE_JOINTS = 3  # joints that move at constant paces: about one line, or two of three lines that are parallel
 STEP = 0.03  # distance [rad] along a null direction up to which a self-motion is followed
 STEPS = np.array([[STEP], [10 * STEP]])  # steps [rad] along a null direction: a short one and a long one
 
@@ -96,7 +96,7 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
     # one of the two postures may be where its own self-motion meets the other's
     turned = np.where(curve[k, i], 0.0, size).max(axis=1)
     thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
-    held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= ALONG)
+    held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= LINE_JOINTS)
     # at one of the two postures a joint may move too slowly to be called free
     most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
     slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)

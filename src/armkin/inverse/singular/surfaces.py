@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.array_tuples import widen_columns
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import OWN, Examined, Goals, Seeds
+from armkin.inverse.answers.batch import OWN_LABEL, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.components import examine
@@ -56,7 +56,7 @@ def _with_curves(goals: Goals, decision: Examined, k: np.intp) -> Examined:
     q, valid, label = (widen_columns(array, len(rows)) for array in (decision.q, decision.valid, decision.label))
     listed = decision._replace(q=q, valid=valid, label=label, free=decision.free.copy())
     used = np.arange(listed.q.shape[1]) < len(rows)
-    listed.q[k], listed.valid[k], listed.label[k] = np.nan, used, OWN
+    listed.q[k], listed.valid[k], listed.label[k] = np.nan, used, OWN_LABEL
     listed.q[k, used], listed.label[k, used] = rows, names
     listed.free[k] |= free
     return listed
@@ -73,7 +73,7 @@ def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int,
     held_arm = lock(arm, {arm.joint_names[j]: float(near[j])})
     starts = newton.many_starts(held_arm, task, target, np.ones(1, bool))[0]
     starts = starts[~np.isnan(starts[:, 0])]
-    marks = np.concatenate([label, np.full(len(starts), OWN)])
+    marks = np.concatenate([label, np.full(len(starts), OWN_LABEL)])
     seeds = Seeds.of(np.concatenate([turned[:, joints], starts])[None], marks[None])
     decision = examine(Goals(held_arm, task, target, near[None, joints]), seeds, no_more)
     valid = decision.valid[0]

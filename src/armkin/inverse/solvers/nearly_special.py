@@ -30,29 +30,29 @@ from armkin.inverse.elimination import method
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.solvers import general, pairs, position_pencil
-from armkin.inverse.solvers.pairs import AROUND, targets_around
+from armkin.inverse.solvers.pairs import AROUND_FACTOR, targets_around
 from armkin.inverse.tasks.choose_task import NEARLY_PARALLEL
 from armkin.inverse.tasks.task import Task, distance, targets_of
 from armkin.model.arm import Arm
 
 CHUNK = 1024  # poses corrected at once
 NAMED_AT_ONCE = 256  # targets whose branches are named at once: buffers of so many are kept
-SICK = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
-APART = 0.5  # distance [rad] of a branch from the similar arm's whose name it takes
+SICK_SHARE = 0.08  # share of poses that a healthy elimination leaves open in its first two passes
+NAME_DISTANCE = 0.5  # distance [rad] of a branch from the similar arm's whose name it takes
 RINGS = (1.0, 5.0, 25.0)  # factors on the distance from the class, for seeds on the other side of a singularity
 
 
 def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
-    """The class that the arm is nearest to, of those that would fit if its axes moved by `NEAR`, and how far it is."""
+    """The class nearest to the arm, of those that would fit if its axes moved by `NEAR_DEFECT`, and its distance."""
     wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
     limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
-    classes = [*((module, limit) for module in wide), *((module, tol.NEAR) for module in narrow)]
+    classes = [*((module, limit) for module in wide), *((module, tol.NEAR_DEFECT) for module in narrow)]
     fitting = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
     return min(((_class_gap(arm, task, alike), alike) for alike in fitting), key=lambda pair: pair[0], default=None)
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
-    """Arms that a closed form would fit if their axes moved by `NEAR`, or by more if nothing else fits."""
+    """Arms that a closed form would fit if their axes moved by `NEAR_DEFECT`, or by more if nothing else fits."""
     # of an axis see `armkin.inverse.solvers.tool_axis`
     if task.orientation == "axis" or (nearest := _nearest_class(arm, task)) is None:
         return None
@@ -90,7 +90,7 @@ def _by_elimination(arm: Arm, task: Task, alike: Geometry, gap: float, general_:
     """The elimination, its branches named after those of the similar arm; None if it is not healthy on this arm."""
     if general_ is None or general_.elimination is None or general_.rows is None or not general_.complete:
         return None
-    if method.left_open(general_.elimination) > SICK:
+    if method.left_open(general_.elimination) > SICK_SHARE:
         return None
     source = recorded_formula(arm, task, alike)
 
@@ -132,7 +132,7 @@ def _branch_places(source: Recorded, gap: float, q: Array, target: Array) -> Int
         away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
         nearest, back = away.argmin(axis=2), away.argmin(axis=1)
         mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(B)
-        row, place = np.nonzero(mutual & (away.min(axis=2, initial=np.inf) < APART))
+        row, place = np.nonzero(mutual & (away.min(axis=2, initial=np.inf) < NAME_DISTANCE))
         numbers[row, nearest[row, place]] = place
     unnamed = present & (numbers < 0)
     return np.where(unnamed, B - 1 + unnamed.cumsum(axis=1), numbers)
@@ -198,7 +198,7 @@ def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int)
     flat[size > tol.SOLUTION] = np.nan
     q = _filled_columns(flat.reshape(N, B, n), places)
     for i in range(1, q.shape[1]):
-        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.ALIKE
+        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.SAME_ANSWER
         q[again.any(axis=1), i] = np.nan
     return _filled_columns(q, places)
 
@@ -227,12 +227,12 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
     arm, task = source.arm, source.task
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(tol.STEADY, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
+    weak = min(tol.STEADY_VALUE, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
     limit = 9.0 * gaps[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
     real = miss < limit
-    for moved in targets_around(arm, task, target, AROUND * gaps):
+    for moved in targets_around(arm, task, target, AROUND_FACTOR * gaps):
         q, miss, doubt_there = source.rows(moved)
-        steady = newton.wrapped_distance(arm, q, seed) < AROUND * gaps[:, None] / weak
+        steady = newton.wrapped_distance(arm, q, seed) < AROUND_FACTOR * gaps[:, None] / weak
         doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     flat = seed.reshape(-1, n)
@@ -245,6 +245,6 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
     doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
     for i in range(B):
         for j in range(i):
-            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.ALIKE
+            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.SAME_ANSWER
             doubt |= same & good[:, i] & good[:, j]
     return branch, good, doubt

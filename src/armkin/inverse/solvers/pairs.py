@@ -28,12 +28,12 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import rotation_about
 from armkin.model.units import radian_or_reach
 
-AROUND = 10.0  # distance, in distances from the class, by which a target is moved to see whether its branches stay
+AROUND_FACTOR = 10.0  # distance, in distances from the class, by which a target is moved to see if its branches stay
 # square of half of what lies between complex roots, up to which they may be one real root
 TOUCHING = tol.APART_ROOTS**2
 MOVED = 0.3  # distance [rad, reaches] of a pair from the class's, at most
 STEPS = 8  # steps of Newton's method for a pair
-LARGEST = 0.3  # length [rad, reaches], at most, of each step for a pair
+MAX_STEP = 0.3  # length [rad, reaches], at most, of each step for a pair
 
 
 def targets_around(arm: Arm, task: Task, target: Array, size: Array) -> Iterator[Array]:
@@ -125,7 +125,7 @@ def _keep_sense(source: Recorded, branches: tuple[Int, ...], gaps: Array, target
     M = np.arange(len(row))
     way = way / radian_or_reach(arm)
     widest, apart = np.zeros(len(row)), way.copy()
-    for moved in targets_around(arm, source.task, target[row], AROUND * gaps[row]):
+    for moved in targets_around(arm, source.task, target[row], AROUND_FACTOR * gaps[row]):
         q = source.rows(moved)[0]
         between = newton.difference(arm, q[M, first], q[M, second])
         size = np.nan_to_num(np.abs(between).max(axis=1))
@@ -173,7 +173,7 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
         missing = np.concatenate([even, odd, np.zeros((len(active), 1))], axis=1)
         with np.errstate(all="ignore"):
             step = newton.nudged(np.linalg.solve, np.nan_to_num(system), np.nan_to_num(missing)[:, :, None])[:, :, 0]
-        step *= np.minimum(1.0, LARGEST / np.maximum(np.abs(step).max(axis=1), LARGEST))[:, None]
+        step *= np.minimum(1.0, MAX_STEP / np.maximum(np.abs(step).max(axis=1), MAX_STEP))[:, None]
         middle[active] += step[:, :n] * unit
         way[active] += step[:, n:-1]
         square[active] += step[:, -1]

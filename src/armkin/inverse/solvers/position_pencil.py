@@ -34,7 +34,7 @@ from armkin.model.joint_chain import Chain
 from armkin.model.rotation import inverse
 
 CHUNK = 1024  # targets solved at once
-ALL = np.array(list(permutations(range(4))))  # orders of four roots: which of them goes where
+ORDERS = np.array(list(permutations(range(4))))  # orders of four roots: which of them goes where
 
 
 class _Roots(NamedTuple):
@@ -150,5 +150,5 @@ def _solve_chunk(pencil: Pencil, target: Array) -> Rows:
 def _root_order(away: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     away = np.where(np.isnan(away), np.pi, away)
-    cost = away[:, np.arange(4), ALL].sum(axis=2)
-    return np.asarray(ALL[cost.argmin(axis=1)])
+    cost = away[:, np.arange(4), ORDERS].sum(axis=2)
+    return np.asarray(ORDERS[cost.argmin(axis=1)])

@@ -78,7 +78,7 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
         if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
         rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
-        for alike in (module.recognise(rest_arm, free.task, tol.NEAR) for module in (spherical, three_parallel)):
+        for alike in (module.recognise(rest_arm, free.task, tol.NEAR_DEFECT) for module in (spherical, three_parallel)):
             if alike is not None and (option := Redundancy(joint, rest_arm, free.task, alike)).by_formula:
                 return option
     return free

@@ -38,8 +38,8 @@ LABELS = {
 ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
 ROUNDED = 1e-14  # distance from orthonormal columns that needs no correction
 NO_DIRECTION = 1e-12  # length of a vector that has no direction
-AROUND = 1e-4  # distance [reaches, rad] of the targets around one from it
-LARGEST = 1e15  # size [mm, rad] of a target, at most: its powers in the polynomials stay finite
+AROUND_DISTANCE = 1e-4  # distance [reaches, rad] of the targets around one from it
+MAX_TARGET = 1e15  # size [mm, rad] of a target, at most: its powers in the polynomials stay finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,10 +113,10 @@ def flat_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
 
 def _refuse_wild(values: Array) -> None:
     """Raise UsageError for numbers that are not finite or too large."""
-    if not (values.min(initial=0.0) >= -LARGEST and values.max(initial=0.0) <= LARGEST):
+    if not (values.min(initial=0.0) >= -MAX_TARGET and values.max(initial=0.0) <= MAX_TARGET):
         if not np.isfinite(values).all():
             raise UsageError("a target holds nan or infinity; every number must be finite")
-        raise UsageError(f"a target holds a number beyond {LARGEST:g}; no arm reaches there")
+        raise UsageError(f"a target holds a number beyond {MAX_TARGET:g}; no arm reaches there")
 
 
 def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
@@ -199,7 +199,7 @@ def shifted_targets(arm: Arm, task: Task, target: Array, way: Array) -> Array:
     return targets
 
 
-def targets_around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND) -> Array:
+def targets_around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND_DISTANCE) -> Array:
     """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
     ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
     return np.stack([shifted_targets(arm, task, target, sign * way) for way in ways for sign in (1.0, -1.0)], axis=1)
