@@ -140,7 +140,7 @@ def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
         rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
         size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
         # the fourth derivative is taken for as large as that of the sharpest fold
-        plain = _one_direction_lost(first, lost) & (far > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
+        plain = _one_direction_lost(first, lost, u) & (far > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
         alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
         # up to where the residual of two branches that meet may be 2 SOLUTION
         end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
@@ -171,8 +171,8 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
         bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
         steep = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
         end = 4.0 * np.sqrt(tol.SOLUTION / bend)
-        flat = SURE_FACTOR * slope**2 < 2.0 * tol.SOLUTION * (bend - tol.CURVATURE * end)
-    one, square = _one_direction_lost(inverse, lost), beside.shape[2] == 0
+        flat = (np.abs(ahead + behind) < SYMMETRIC * np.abs(ahead - behind)) & (slope**2 < tol.SOLUTION * bend)
+    one, square = _one_direction_lost(inverse, lost, u), beside.shape[2] == 0
     return np.asarray(one & (passed < tol.FOLD_WAY) & steep), np.asarray(one & (end < tol.FOLD_WAY) & flat & square)
 
 
@@ -184,11 +184,11 @@ def _tangents(v: Array, inverse: Array) -> Array:
 
 
 def _unit(rows: Array) -> Array:
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray(rows / np.sqrt((rows * rows).sum(axis=2, keepdims=True)))
 
 
-def _one_direction_lost(inverse: Array, lost: Array) -> Bool:
+def _one_direction_lost(inverse: Array, lost: Array, u: Array) -> Bool:
     """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
-    remaining = (inverse * inverse).sum(axis=(1, 2)) - (lost * lost).sum(axis=(1, 2))
-    return np.asarray(remaining * tol.HIGH**2 < 1.0)
+    remaining = inverse - lost @ u
+    return np.asarray((remaining * remaining).sum(axis=(1, 2)) * tol.HIGH**2 < 1.0)
