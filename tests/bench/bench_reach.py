@@ -88,7 +88,7 @@ def places_agree(solve: Any = armkin.ik) -> bool:
         took = time.process_time() - began
         total, arms = total + took, arms + 1
         print(f"{name:16}{took:.2f} s", flush=True)
-        question = place_targets.Question(arm, task, targets, 72, np.pi / 36, 0.0)
+        question = place_targets.PlaceQuestion(arm, task, targets, 72, np.pi / 36, 0.0)
         for i, j, k in rng.integers(0, places.reached.shape, (1000 // 20, 3)).tolist():
             legal = place_targets.legal_from(question, np.array([places.x[i], places.y[j]]), float(places.yaw[k]))
             different += int(legal.sum()) != places.reached[i, j, k]
@@ -105,7 +105,7 @@ def compiled_agrees() -> bool:
 
 def cells_agree(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
-    from armkin.reachability.cell_answers import TURN, Question, cell_columns
+    from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
     from armkin.reachability.reach_cells import Grid
 
     rng, total, different = np.random.default_rng(seed), 0, 0
@@ -115,7 +115,7 @@ def cells_agree(seed: int = 1, poses: int = 10**6) -> bool:
             M, N, L = (int(rng.integers(*limits)) for limits in ((3, 60), (2, 40), (2, 30)))
             grid = Grid(arm, arm.reach / rng.uniform(3.0, 15.0), M, N, L, bool(rng.integers(2)) and arm.n > 3)
             ring = grid.rings[rng.integers(0, len(grid.rings), 1)]
-            columns = cell_columns(Question(grid), ring)
+            columns = cell_columns(CellQuestion(grid), ring)
             D, L = grid.directions_count, grid.rolls_count
             k, orientation = np.divmod(np.arange(M * D * L), D * L)
             goals = grid.targets(

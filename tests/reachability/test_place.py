@@ -30,7 +30,7 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     yaw = np.radians(60.0)
     [places] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
-    question = place_targets.Question(arm, task_for(arm), targets, len(places.yaw), float(yaw), 0.0)
+    question = place_targets.PlaceQuestion(arm, task_for(arm), targets, len(places.yaw), float(yaw), 0.0)
     assert places.of == 4
     assert places.reached.max() > 0
     for _ in range(60):

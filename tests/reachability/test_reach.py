@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import UsageError
 from armkin.reachability import reach_map as maps
 from armkin.reachability import voxels
-from armkin.reachability.cell_answers import TURN, Question, cell_columns
+from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
 from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
 from ctrl_c import interrupt_at
@@ -52,7 +52,7 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
     arm = armkin.load(name)
     is_slow = name in ("jaco_j2n6s300",)
     grid = Grid(arm, arm.reach / 9, 3 if is_slow else 7, 4 if is_slow else 9, 2 if is_slow else 5, False)
-    question = Question(grid)
+    question = CellQuestion(grid)
     rings = grid.rings[np.random.default_rng(4).permutation(len(grid.rings))[: 2 if is_slow else 20]]
     values_of = cell_columns(question, rings)
     assert question.by_arcs
@@ -63,7 +63,7 @@ def test_arcs_are_what_each_pose_says(name: str) -> None:
 
 def test_rings_that_no_branch_reaches_are_counted_as_that() -> None:
     grid = Grid(armkin.load("moveo"), 60.0, 2, 4, 1, False)
-    columns = cell_columns(Question(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
+    columns = cell_columns(CellQuestion(grid, measures=False), np.array([[11, 11]]))  # 930 mm away, of 761
     assert columns["share"].tolist() == columns["share_any"].tolist() == [0.0, 0.0]
     assert np.isnan(columns["branches"]).all()
 
@@ -127,7 +127,7 @@ def test_the_share_under_keep_outs_is_what_another_count_finds() -> None:
 
 def test_an_arm_of_seven_joints_is_asked_pose_by_pose() -> None:
     grid = Grid(armkin.load("iiwa7"), 300.0, 1, 2, 1, False)
-    question = Question(grid)
+    question = CellQuestion(grid)
     assert not question.by_arcs
     ring = np.array([[1, 1]])
     value_of = {name: float(values[0]) for name, values in cell_columns(question, ring).items()}

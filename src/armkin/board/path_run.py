@@ -66,7 +66,9 @@ def follow_plan(
     ask: what ends a rest until Enter.
     """
     elapsed, total = 0.0, sum(part.duration for part in laid)
-    markers: list[Marker | None] = [None] * (plan.approach is not None) + list(plan.markers)
+    markers: list[Marker | None] = list(plan.markers)
+    if plan.approach is not None:  # no marker stands behind it
+        markers.insert(0, None)
     for k, part in enumerate(laid, first):
         if part.trajectory.stretches:
             begun = elapsed

@@ -180,7 +180,7 @@ def _motor_matrix(answer: Mapping[str, Any]) -> str:
         for name, weight in motor["joints"].items():
             size = "" if abs(weight) == 1 else f"{short_text(abs(weight))} "
             sign = "-" if weight < 0 else "+"
-            total += f" {sign} {size}{name}" if total else f"{'-' * (weight < 0)}{size}{name}"
+            total += f" {sign} {size}{name}" if total else f"{sign}{size}{name}".removeprefix("+")
         lines.append(f"  motor {motor['name']} = {total}")
     return "\n".join(lines)
 

@@ -120,7 +120,8 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     label = (
         f"{len(starts)} other branch{'es' * plural} that {'carry' if plural else 'carries'} all, at the path's start"
     )
-    poses = [*(("_" * (k > 0) + label, pose, "#b0b0b0", 1.6, "-") for k, pose in enumerate(starts)), *poses]
+    labels = [label, *[f"_{label}"] * len(starts)]  # matplotlib leaves what begins with _ out of its legend
+    poses = [*((text, pose, "#b0b0b0", 1.6, "-") for text, pose in zip(labels, starts, strict=False)), *poses]
     bones = [(name, skeleton(arm, pose), *look) for name, pose, *look in poses]
     points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)

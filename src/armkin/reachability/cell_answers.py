@@ -37,7 +37,7 @@ Words = NDArray[np.uint64]
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class CellQuestion:
     """A grid, and by which arcs it is answered; measures: whether the columns that need Jacobians are filled."""
 
     grid: Grid
@@ -87,7 +87,7 @@ class Question:
         return self.grid.azimuths if self.by_arcs and not self.round_azimuths else 1
 
 
-def cell_columns(question: Question, rings: Array) -> dict[str, Array]:
+def cell_columns(question: CellQuestion, rings: Array) -> dict[str, Array]:
     """The columns of some rings (R, 2), M rows each, besides x, y, z."""
     grid, M = question.grid, question.grid.azimuths
     count = question.solves_a_ring // (1 if question.by_arcs else M)
@@ -116,7 +116,7 @@ class _Edges(NamedTuple):
 class _Answers:
     """The answers of S solves, each for M azimuths and W words of rolls (both 1 where they are no arcs)."""
 
-    def __init__(self, question: Question, target: Array, azimuth: Array, direction: NDArray[np.intp]) -> None:
+    def __init__(self, question: CellQuestion, target: Array, azimuth: Array, direction: NDArray[np.intp]) -> None:
         self.question, self.grid, self.arm = question, question.grid, question.grid.arm
         self.azimuth, self.direction = azimuth, direction
         s = ik(self.arm, target)

@@ -39,7 +39,7 @@ from armkin.reachability.cell_answers import TURN, limit_margin
 from armkin.reachability.place_arm import split_keep_outs
 from armkin.reachability.place_path import PathFromPlace
 from armkin.reachability.place_targets import (
-    Question,
+    PlaceQuestion,
     Solve,
     at_value,
     each_value,
@@ -109,7 +109,7 @@ class Place:
         return np.array([self.x[self.best[0]], self.y[self.best[1]], self.z])
 
 
-class Chunk(NamedTuple):
+class PositionChunk(NamedTuple):
     """Some positions (P, 2) [mm] of one arm."""
 
     number: int
@@ -211,17 +211,17 @@ def place_several(
     return places
 
 
-def _chunks(questions: Sequence[Question], grids: Sequence[tuple[Array, Array]]) -> list[Chunk]:
+def _chunks(questions: Sequence[PlaceQuestion], grids: Sequence[tuple[Array, Array]]) -> list[PositionChunk]:
     """All positions of all arms, some at a time."""
-    made: list[Chunk] = []
+    made: list[PositionChunk] = []
     for i, (question, axes) in enumerate(zip(questions, grids, strict=True)):
         positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        made += [Chunk(len(made) + k, i, part) for k, part in enumerate(_position_blocks(question, positions))]
+        made += [PositionChunk(len(made) + k, i, part) for k, part in enumerate(_position_blocks(question, positions))]
     return made
 
 
 def _place_result(
-    question: Question,
+    question: PlaceQuestion,
     axes: tuple[Array, Array],
     inner: tuple[slice, slice],
     counts: NDArray[np.int64],
@@ -239,7 +239,7 @@ def _place_result(
     return _add_postures(question, place if file is None else _plan_best_places(question, place, file, room))
 
 
-def _add_postures(question: Question, place: Place) -> Place:
+def _add_postures(question: PlaceQuestion, place: Place) -> Place:
     """The same with, for each target reached from the best place, the legal posture that is nearest to home."""
     position, turn = place.xyz[:2], float(place.yaw[place.best[2]])
     plan = next((path.plan for path in place.planned if path.index == place.best and path.plan is not None), None)
@@ -255,7 +255,7 @@ def _add_postures(question: Question, place: Place) -> Place:
     return replace(place, postures=unlock(question.arm, held, q) if len(row) else place.postures, held=held)
 
 
-def _plan_best_places(question: Question, place: Place, file: PathFile, room: Room) -> Place:
+def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, room: Room) -> Place:
     """The same with the best places planned; one that cannot be planned does not reach all."""
     if why := place_path.missing_rates_text(question.arm):
         return replace(place, unplanned=why)
@@ -276,7 +276,7 @@ def _plan_best_places(question: Question, place: Place, file: PathFile, room: Ro
 
 def _question(
     arm: Arm, targets: Any, file: PathFile | None, settings: dict[str, Any], scene: str | os.PathLike[str] | None
-) -> Question:
+) -> PlaceQuestion:
     """What is asked of one arm: its own keep-outs apart from those of a scene."""
     ways: tuple[int, ...] = ()
     spare, held = "", tuple[float, ...]()
@@ -289,10 +289,12 @@ def _question(
     arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values, *_ = read_targets(task, targets)
-    return Question(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
+    return PlaceQuestion(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
 
 
-def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.PathLike[str] | None) -> Parts | None:
+def _parts(
+    questions: list[PlaceQuestion], settings: dict[str, Any], out: str | os.PathLike[str] | None
+) -> Parts | None:
     """What is answered, kept beside the file until it stands."""
     if out is None:
         return None
@@ -305,7 +307,7 @@ def _parts(questions: list[Question], settings: dict[str, Any], out: str | os.Pa
 
 
 def _axes(
-    question: Question, area: Sequence[float] | None, step: float
+    question: PlaceQuestion, area: Sequence[float] | None, step: float
 ) -> tuple[tuple[Array, Array], tuple[slice, slice]]:
     """The grid's x and y, as far as any place can reach all targets, and which of them are in the area."""
     arm = question.arm
@@ -328,7 +330,7 @@ def _axes(
     return (axes[0], axes[1]), (inner[0], inner[1])
 
 
-def _position_blocks(question: Question, positions: Array) -> Iterator[Array]:
+def _position_blocks(question: PlaceQuestion, positions: Array) -> Iterator[Array]:
     first = next(each_value(question))
     solves = len(first.targets) * (1 if first.by_arcs else first.yaws) * max(len(question.values), 1)
     count = max((ANSWERS // len(first.targets) // first.yaws if first.by_distance_alone else SOLVES // solves), 1)
@@ -336,7 +338,7 @@ def _position_blocks(question: Question, positions: Array) -> Iterator[Array]:
         yield positions[start : start + count]
 
 
-def count_chunk(questions: list[Question], chunk: Chunk) -> tuple[int, Table]:
+def count_chunk(questions: list[PlaceQuestion], chunk: PositionChunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
     return chunk.number, {"reached": reached_counts(questions[chunk.question], chunk.positions).ravel()}
 
@@ -374,7 +376,7 @@ def _best_place(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[
     return i, j, k
 
 
-def _limit_rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
+def _limit_rooms(question: PlaceQuestion, x: Array, y: Array, yaws: Array) -> Room:
     """`_limit_room` of places by their index, each asked once."""
 
     @cache
@@ -384,7 +386,7 @@ def _limit_rooms(question: Question, x: Array, y: Array, yaws: Array) -> Room:
     return room
 
 
-def _limit_room(question: Question, position: Array, turn: float) -> float:
+def _limit_room(question: PlaceQuestion, position: Array, turn: float) -> float:
     """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
     question = at_value(question, position, turn)
     s, legal = free_from(question, position, turn)

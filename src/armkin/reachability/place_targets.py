@@ -40,7 +40,7 @@ class HeldArm(NamedTuple):
     joints: dict[str, float]
 
 
-class Question(NamedTuple):
+class PlaceQuestion(NamedTuple):
     """Targets of one arm, in the targets' frame."""
 
     arm: Arm
@@ -87,7 +87,7 @@ def positions_of(task: Task, targets: Array) -> Array:
     return targets[:, :3, 3] if task.orientation == "full" else targets[:, : task.position]
 
 
-def reached_counts(question: Question, positions: Array) -> NDArray[np.int64]:
+def reached_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int64]:
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
         return _greatest_counts(question, positions)
@@ -96,7 +96,7 @@ def reached_counts(question: Question, positions: Array) -> NDArray[np.int64]:
     return np.concatenate([_count_targets(question, block, _legal_yaws(question, block)) for block in blocks])
 
 
-def _greatest_counts(question: Question, positions: Array) -> NDArray[np.int64]:
+def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int64]:
     """The same of a redundant joint's values: the most of what is reached with it held at each of its values.
 
     Keep-outs only take away: a place is asked among them where more is reached without them than is known.
@@ -117,7 +117,7 @@ def _greatest_counts(question: Question, positions: Array) -> NDArray[np.int64]:
     return counts
 
 
-def each_value(question: Question) -> Iterator[Question]:
+def each_value(question: PlaceQuestion) -> Iterator[PlaceQuestion]:
     """The question with the redundant joint held at each value; itself where there is none to hold."""
     if not question.values:
         yield question
@@ -127,7 +127,7 @@ def each_value(question: Question) -> Iterator[Question]:
         yield question._replace(arm=free_arm, values=(), full_arm=full_arm, solve=ik)
 
 
-def at_value(question: Question, position: Array, turn: float) -> Question:
+def at_value(question: PlaceQuestion, position: Array, turn: float) -> PlaceQuestion:
     """The question with the redundant joint held at the first value at which most is reached from one place."""
     if not question.values:
         return question
@@ -152,7 +152,7 @@ def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
     return lock(arm, {joint: value})
 
 
-def _count_targets(question: Question, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
     """The same of what is legal (P, N, K); of ways that one branch does not carry, less than all."""
     if not question.ways:
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
@@ -168,7 +168,7 @@ def _count_targets(question: Question, positions: Array, legal: NDArray[np.bool_
     return counts
 
 
-def _legal_yaws(question: Question, positions: Array) -> NDArray[np.bool_]:
+def _legal_yaws(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_]:
     """Which targets are reached from positions (P, 2) at each yaw: (P, N, K)."""
     N, K = len(question.targets), question.yaws
     if question.arm.keep_out or question.obstacles.keep_out:
@@ -187,7 +187,7 @@ def _legal_yaws(question: Question, positions: Array) -> NDArray[np.bool_]:
     return legal.reshape(len(positions), N, K)
 
 
-def _by_radius(question: Question, positions: Array) -> NDArray[np.bool_] | None:
+def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] | None:
     """The same by what the joints behind joint 1 do at a target's distance from it; None without a closed form."""
     high = question.targets.copy()
     if question.task.position > 2:
@@ -206,7 +206,7 @@ def _by_radius(question: Question, positions: Array) -> NDArray[np.bool_] | None
     return legal
 
 
-def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
+def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
     legal = np.zeros((len(target), question.yaws), bool)
     near = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
@@ -226,7 +226,7 @@ def _by_arcs(question: Question, target: NDArray[np.intp], place: Array) -> NDAr
     return legal
 
 
-def _legal_turns(question: Question, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _legal_turns(question: PlaceQuestion, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which yaws some branch is within limits: n joints' values at yaw 0 (B, M), valid (B, M) -> (M, K)."""
     arm, K = question.arm, question.yaws
     allowed = valid
@@ -236,7 +236,7 @@ def _legal_turns(question: Question, values: list[Array], valid: NDArray[np.bool
     return _covered_arcs(first, np.where(allowed, length, 0), K)
 
 
-def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
+def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """The same by a solve for each yaw, many together."""
     K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
@@ -251,7 +251,7 @@ def _yaw_by_yaw(question: Question, target: NDArray[np.intp], place: Array) -> N
     return legal
 
 
-def _any_legal(question: Question, goals: Array) -> NDArray[np.bool_]:
+def _any_legal(question: PlaceQuestion, goals: Array) -> NDArray[np.bool_]:
     """Which targets, in the arm's frame, some branch within limits reaches: (N,)."""
     arm, legal, left = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
     isolated_answers = arm.n == question.task.constraints
@@ -269,7 +269,7 @@ def _any_legal(question: Question, goals: Array) -> NDArray[np.bool_]:
     return legal
 
 
-def _within_reach(question: Question, target: NDArray[np.intp], place: Array, turns: Array) -> NDArray[np.bool_]:
+def _within_reach(question: PlaceQuestion, target: NDArray[np.intp], place: Array, turns: Array) -> NDArray[np.bool_]:
     """Which targets (M,) are near enough to joint 1, of an arm at places (M, 2) and yaws (K,), to be reached: (M, K).
 
     Others are not asked: no point of an arm is farther from its joint 1 than its reach.
@@ -303,7 +303,7 @@ def _prefix_bits(count: int) -> NDArray[np.uint64]:
     return np.concatenate([once, once[-1] ^ once[1:]])
 
 
-def _on_one_branch(question: Question, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _on_one_branch(question: PlaceQuestion, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which of some yaws (K,) one branch carries all targets."""
     arm, K = question.arm, question.yaws
     if question.by_arcs:
@@ -321,13 +321,13 @@ def _on_one_branch(question: Question, position: Array, yaws: NDArray[np.bool_])
     return carried
 
 
-def legal_from(question: Question, position: Array, turn: float) -> NDArray[np.bool_]:
+def legal_from(question: PlaceQuestion, position: Array, turn: float) -> NDArray[np.bool_]:
     """Which targets are reached from one place: (N,)."""
     return np.asarray(free_from(question, position, turn)[1].any(axis=1))
 
 
 def free_from(
-    question: Question, position: Array, turn: float, legal_only: bool = True
+    question: PlaceQuestion, position: Array, turn: float, legal_only: bool = True
 ) -> tuple[Solutions, NDArray[np.bool_]]:
     """The branches of all targets from one place, and which are free (N, B); legal_only: and within limits."""
     # of a family every posture is an answer, but what one branch carries is another
@@ -343,12 +343,12 @@ def free_from(
     return s, np.asarray(legal)
 
 
-def targets_from(question: Question, position: Array, turn: float) -> Array:
+def targets_from(question: PlaceQuestion, position: Array, turn: float) -> Array:
     """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
     return _turn_targets(question.task, _shift_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn))
 
 
-def _shift_targets(question: Question, position: Array) -> Array:
+def _shift_targets(question: PlaceQuestion, position: Array) -> Array:
     """The same of an arm that is not turned."""
     targets = question.targets.copy()
     shift = np.concatenate([position, np.full((*position.shape[:-1], 1), question.z)], axis=-1)

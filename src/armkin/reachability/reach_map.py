@@ -24,7 +24,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual_arm
 from armkin.reachability import kept_chunks
-from armkin.reachability.cell_answers import TURN, Question, cell_columns
+from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
 from armkin.reachability.reach_cells import Grid
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class Reach:
         return self.grid.orientations
 
 
-class Chunk(NamedTuple):
+class RingChunk(NamedTuple):
     """Some rings, by their number."""
 
     number: int
@@ -138,7 +138,9 @@ def reach(
     ('arcs', 744, 200)
     """
     started = time.perf_counter()
-    question = Question(Grid(arm, float(grid), int(azimuths), int(directions), int(rolls), bool(tool_down)), measures)
+    question = CellQuestion(
+        Grid(arm, float(grid), int(azimuths), int(directions), int(rolls), bool(tool_down)), measures
+    )
     rings = question.grid.rings
     if not len(rings):
         raise UsageError(f"grid: {grid:g} mm: no cell within a reach of {arm.reach:.0f} mm; take a finer grid")
@@ -157,15 +159,15 @@ def reach(
     )
 
 
-def chunks(question: Question) -> Iterator[Chunk]:
+def chunks(question: CellQuestion) -> Iterator[RingChunk]:
     """All rings, some at a time; the same ones for every engine."""
     rings = question.grid.rings
     rings_each = max(SOLVES // _cost(question) // question.solves_a_ring, 1)
     for number, start in enumerate(range(0, len(rings), rings_each)):
-        yield Chunk(number, rings[start : start + rings_each])
+        yield RingChunk(number, rings[start : start + rings_each])
 
 
-def _cost(question: Question) -> int:
+def _cost(question: CellQuestion) -> int:
     """How many times as long as by a closed form a solve takes, roughly."""
     arm, task = question.grid.arm, question.grid.task
     if arm.n > task.constraints:
@@ -173,7 +175,7 @@ def _cost(question: Question) -> int:
     return 1 if solver(actual_arm(arm), task.name)[1].pairs is not None else SLOWER
 
 
-def answer_chunk(question: Question, chunk: Chunk) -> tuple[int, Table]:
+def answer_chunk(question: CellQuestion, chunk: RingChunk) -> tuple[int, Table]:
     """The columns of a chunk: a pure function, wherever it runs."""
     grid, M = question.grid, question.grid.azimuths
     rings_each = max(BLOCK // question.solves_a_ring, 1)
@@ -191,7 +193,7 @@ class _Run:
     """A map that is made: its chunks, its file, and its sums."""
 
     def __init__(
-        self, question: Question, out: str | None, engine: Engine, progress: Callable[[int], None] | None
+        self, question: CellQuestion, out: str | None, engine: Engine, progress: Callable[[int], None] | None
     ) -> None:
         self.question, self.out = question, out
         self.engine, self.progress = engine, progress
@@ -205,7 +207,7 @@ class _Run:
                 require_pyarrow()
             self.parts = Parts(out, _dependencies(question))
 
-    def answer_all(self, all_chunks: list[Chunk]) -> dict[str, Array]:
+    def answer_all(self, all_chunks: list[RingChunk]) -> dict[str, Array]:
         """Answer all chunks; the columns, unless they are in a file and too many."""
         kept_tables: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
@@ -222,7 +224,7 @@ class _Run:
         tables = [kept_tables[number] for number in sorted(kept_tables)]
         return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keep else {}
 
-    def _count(self, chunk: Chunk, table: Table) -> None:
+    def _count(self, chunk: RingChunk, table: Table) -> None:
         grid = self.question.grid
         reached = np.asarray(table["share"]) > 0
         r = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
@@ -253,7 +255,7 @@ class _Run:
             parts.remove()
 
 
-def _dependencies(question: Question) -> dict[str, Any]:
+def _dependencies(question: CellQuestion) -> dict[str, Any]:
     """What the columns depend on."""
     grid, arm = question.grid, question.grid.arm
     names = ("step", "azimuths", "directions", "rolls", "tool_down")

@@ -71,7 +71,7 @@ class Random:
 
 
 @dataclass(frozen=True)
-class Grid:
+class JointGrid:
     """Every combination of evenly spaced joint values, the last joint changing fastest.
 
     Both limits are on the grid. An unlimited joint's turn is half open: -180 is on it, 180 is not.
@@ -119,9 +119,9 @@ class Grid:
         return np.asarray(np.minimum(first + step * index, high))
 
 
-Sampling = Random | Grid
+Sampling = Random | JointGrid
 
 
-def joint_grid(arm: Arm, points: Sequence[int]) -> Grid:
+def joint_grid(arm: Arm, points: Sequence[int]) -> JointGrid:
     """A grid of so many points a joint; a single number counts for every joint."""
-    return Grid(arm, tuple(points) * arm.n if len(points) == 1 else tuple(points))
+    return JointGrid(arm, tuple(points) * arm.n if len(points) == 1 else tuple(points))

@@ -79,7 +79,8 @@ class Modes:
         words = [f"G{self.motion:g}", self.system, f"G{self.plane:g}", "G21" if self.unit == 1.0 else "G20"]
         words += ["G91" if self.relative else "G90", "G93" if self.inverse else "G94"]
         if self.hal:
-            words += ["G92"] * any(self.g92) + ["G40", "G43.1" if any(self.tool) else "G49", "G98", "G50"]
+            words += ["G92"] if any(self.g92) else []
+            words += ["G40", "G43.1" if any(self.tool) else "G49", "G98", "G50"]
         words += ["M5" if spindle is None else "M3", "M9", "T0", f"F{self.feed:.0f}", f"S{spindle or 0:g}"]
         return f"[GC:{' '.join(words)}]"
 

@@ -209,9 +209,10 @@ class Grbl(SimulatedTime):
         if not bits & 1:
             place = [a - b for a, b in zip(place, shift, strict=True)]
         text = f"<{self._state_text()}|{'MPos' if bits & 1 else 'WPos'}:{_three_decimals(place)}"
-        text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" * (bits >> 1 & 1) + "|FS:0,0"
+        text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" if bits & 2 else ""
         turn, self._reports = self._reports % _SEEN, self._reports + 1
-        return f"{text}{f'|Ov:{self.override},100,100' * (turn == 0)}{f'|WCO:{_three_decimals(shift)}' * (turn == 1)}>"
+        in_turn = {0: f"|Ov:{self.override},100,100", 1: f"|WCO:{_three_decimals(shift)}"}
+        return f"{text}|FS:0,0{in_turn.get(turn, '')}>"
 
     # Lines
 
@@ -284,9 +285,8 @@ class Grbl(SimulatedTime):
             return -1
         for k in range(self.axes):
             upward = not int(self.settings[23]) >> k & 1
-            away = self.settings[27] if upward else -self.settings[27]
-            travel = 0.0 if upward else -self.settings[130 + k]
-            self.steps[k] = round((travel - away) * self.settings[100 + k])
+            place = -self.settings[27] if upward else self.settings[27] - self.settings[130 + k]
+            self.steps[k] = round(place * self.settings[100 + k])
         self.state = "Idle"
         return 0
 

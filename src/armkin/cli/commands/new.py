@@ -120,7 +120,8 @@ def _output_path(name: str, out: str | None) -> str:
     base = os.path.basename(name)
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,79}", base) or base.endswith((".yaml", ".yml")):
         plain = re.sub(r"\.ya?ml$", "", base)
-        raise UsageError(f"NAME: '{name}' is the arm's name, letters and digits" + f"; write {plain}" * (plain != base))
+        advice = "" if plain == base else f"; write {plain}"
+        raise UsageError(f"NAME: '{name}' is the arm's name, letters and digits{advice}")
     path = out or f"{name}.yaml"
     if path != "-" and os.path.exists(path):
         raise FileError(f"{path} is there already; give another name or --out FILE", file=path)

@@ -119,7 +119,9 @@ def _measures_and_kept(names: list[str] | None, shade: str | None) -> tuple[list
     from armkin.plot.workspace_picture import KEEP
     from armkin.reachability.dexterity import MEASURES
 
-    return measures + [shade] * (shade in MEASURES and shade not in measures), KEEP
+    if shade in MEASURES and shade not in measures:
+        measures.append(shade)
+    return measures, KEEP
 
 
 def _compiled_tips(arm: Arm, q: Array) -> Array:

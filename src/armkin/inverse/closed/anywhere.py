@@ -72,7 +72,7 @@ def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
 
 
-class _Ends:
+class _EndJoints:
     """Joints a, b and c of (1), La without the pose; lengths in units of the arm."""
 
     def __init__(self, La: Array, points: bool, tolerance: float) -> None:
@@ -150,7 +150,7 @@ class _Loop:
         self.first = first
         self.joints = [(first + k) % 6 for k in (3, 4, 5)]  # a, b and c
         self.out = link[1] if first == 1 else link[3]  # the link after c
-        self.ends = _Ends(link[5] if first == 1 else link[1], points is not None, tolerance)
+        self.ends = _EndJoints(link[5] if first == 1 else link[1], points is not None, tolerance)
         self.before, self.between = pose.constant(link[4]), pose.constant(link[2])  # a, and a and b: or the pose
         two = link[first + 1], link[first + 2]
         self.points = points

@@ -49,7 +49,7 @@ class RootSeeds(NamedTuple):
         return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.ALONE) & (self.tilt < tol.ALONE)
 
 
-class _Candidates(NamedTuple):
+class _PencilRoots(NamedTuple):
     """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size).
 
     parted: (M,) of a multiple root, whose vectors are those of all that share it.
@@ -108,14 +108,14 @@ def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
     return companion, rough, size < STEADY_ENTRY
 
 
-def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _Candidates:
+def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _PencilRoots:
     """Of roots (N, size) and their vectors (N, size, size) those whose tilt is below tolerance."""
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
     pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
     # pair of roots that almost touch.
     x, u = roots[pose, index].real, vectors.real[pose, :, index]
-    return _Candidates(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
+    return _PencilRoots(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
 
 
 def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
@@ -133,7 +133,7 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < tol.FOLLOWS).all(axis=0))
 
 
-def _part_equal_roots(pencil: Pencil, single: _Candidates, vectors: NDArray[np.complex128]) -> _Candidates:
+def _part_equal_roots(pencil: Pencil, single: _PencilRoots, vectors: NDArray[np.complex128]) -> _PencilRoots:
     """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
     count = len(single.pose)
     # rounding made a complex pair of some
@@ -154,7 +154,7 @@ def _part_equal_roots(pencil: Pencil, single: _Candidates, vectors: NDArray[np.c
         tilt[part], parted[part], stays[part] = 0.0, True, real[good].ravel()
     order = np.flatnonzero(stays)
     order = order[np.argsort(pose[order], kind="stable")]
-    return _Candidates(pose[order], index[order], x[order], tilt[order], u[order], parted[order])
+    return _PencilRoots(pose[order], index[order], x[order], tilt[order], u[order], parted[order])
 
 
 def _root_gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index: Int) -> Array:

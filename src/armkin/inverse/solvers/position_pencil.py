@@ -46,7 +46,7 @@ class _Roots(NamedTuple):
     loose: Bool
 
 
-class Pencil:
+class PositionPencil:
     """The equations of an arm of three turning joints, prepared."""
 
     def __init__(self, arm: Arm, task: Task) -> None:
@@ -119,7 +119,7 @@ def _imaginary(c: NDArray[Any], s: NDArray[Any]) -> Array:
 
 def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | None:
     """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
-    pencil = Pencil(arm, task)
+    pencil = PositionPencil(arm, task)
     seeds = recorded_formula(arm, task, alike)
     if pencil.tight < tol.NO_SECOND or np.prod(seeds.axes) != 4:
         return None
@@ -132,7 +132,7 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
     return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
 
 
-def _solve_chunk(pencil: Pencil, target: Array) -> Rows:
+def _solve_chunk(pencil: PositionPencil, target: Array) -> Rows:
     """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
     arm, task, roots = pencil.arm, pencil.task, pencil.roots(target)
     row, place = np.nonzero(roots.real)
