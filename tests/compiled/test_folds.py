@@ -114,3 +114,20 @@ def test_postures_beside_round_ones_are_what_python_says(name: str) -> None:
     expected, solutions = armkin.ik(arm, target), armkin.compile(arm).ik(target)
     for field in ("status", "valid", "free", "complete"):
         assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
+
+
+def test_what_lies_beyond_a_fold_is_told_without_python(monkeypatch: pytest.MonkeyPatch) -> None:
+    """UR5e poses whose second pair of branches misses them by 2e-7 to 4e-4 of the reach."""
+    arm = armkin.load("ur5e")
+    q = np.array([
+        [0.46758924, 2.825648173, -1.382242768, -1.249506422, -1.475896038, 1.769276865],
+        [0.259115774, -1.878845314, -0.047077875, -1.603162761, 0.731468268, 2.737558509],
+        [-1.304509994, 1.623773441, 0.035104359, -2.259852799, 2.138480149, 0.317201446],
+    ])  # fmt: skip
+    fast, target = armkin.compile(arm), armkin.fk(arm, q)
+    expected = armkin.ik(arm, target)
+    left = left_to_python(monkeypatch)
+    solutions = fast.ik(target)
+    assert not sum(left)
+    for field in ("status", "valid", "within_limits", "branch", "free", "complete"):
+        assert np.array_equal(getattr(solutions, field), getattr(expected, field)), field
