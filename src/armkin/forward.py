@@ -23,13 +23,13 @@ from armkin.formula import arrays, pose
 from armkin.formula.array_shapes import Figures, Frames, Jacobians, Joints, Points, Poses
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
-from armkin.formula.trace import SMALL, LazyCode
+from armkin.formula.trace import SMALL_BATCH, LazyCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 Motion = Entry | tuple[Entry, Entry]  # a joint's value; of one that turns also cosine and sine of its actual angle
-FEW = 16  # poses up to which plain Python is faster than arrays
+FEW_POSES = 16  # poses up to which plain Python is faster than arrays
 
 
 def fk(arm: Arm, q: ArrayLike) -> Poses:
@@ -343,7 +343,7 @@ def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formu
     """
     results = np.empty(values.shape[:-1] + shape)
     flat_q, flat_out = values.reshape(-1, arm.n), results.reshape(-1, math.prod(shape))
-    if len(flat_q) > SMALL:
+    if len(flat_q) > SMALL_BATCH:
         large = _recorded_code(arm, formula).record_now()
         workspace = large.workspace(min(len(flat_q), arrays.CHUNK))
         for start in range(0, len(flat_q), arrays.CHUNK):
@@ -354,7 +354,7 @@ def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formu
                 flat_out[start : start + arrays.CHUNK, k] = entry
         return results
     turns, code = _slides_and_turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
-    if code is not None and len(flat_q) <= FEW:
+    if code is not None and len(flat_q) <= FEW_POSES:
         numbers = code.single_pose_function()
         for k, inputs in enumerate(turns.T.tolist()):
             flat_out[k] = numbers(*inputs)

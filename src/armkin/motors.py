@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 Pulses = NDArray[np.int64]
 
-_LARGEST = 2.0**53  # number of pulses beyond which a double no longer counts whole ones
+_MAX_PULSES = 2.0**53  # number of pulses beyond which a double no longer counts whole ones
 _HALF = 1e-9  # distance [pulses] from a half that is a half, as degrees have no exact radians
 _CANDIDATES = 4096  # pulse vectors that `best_pulses` tries for one pose
 _AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
@@ -142,7 +142,7 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     if values.ndim == 0 or values.shape[-1] != m:
         given_text = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
         raise UsageError(f"{arm.name} has {m} motors: expected {m} pulses on the last axis, got {given_text}")
-    if not np.all(np.abs(values) <= _LARGEST):
+    if not np.all(np.abs(values) <= _MAX_PULSES):
         raise UsageError("pulses must be finite, and at most 2^53 from 0")
     offset = values - arm.motor_bias
     q = offset @ inverse.T
@@ -281,7 +281,7 @@ def _exact_and_slack(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
     if not np.all(np.isfinite(values)):
         raise UsageError("joint values must be finite to become pulses")
     exact = (values - arm.home) @ arm.motor_gain.T + arm.motor_bias
-    if not np.all(np.abs(exact) <= _LARGEST):
+    if not np.all(np.abs(exact) <= _MAX_PULSES):
         raise UsageError("the joint values are too large: more than 2^53 pulses")
     size = (np.abs(values) + np.abs(arm.home)) @ np.abs(arm.motor_gain).T
     return exact, _HALF + 4 * np.finfo(float).eps * size

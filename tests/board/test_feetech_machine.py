@@ -154,15 +154,15 @@ def test_all_servos_are_held_where_they_stand_when_one_falls_behind() -> None:
 def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() -> None:
     """Whoever set up the servo gave it limits: it would stop there, and never arrive."""
     port = servo_bus()
-    port.servos[2].set(registers.LEAST, 1500)
-    port.servos[2].set(registers.MOST, 2300)
+    port.servos[2].set(registers.MIN_POSITION, 1500)
+    port.servos[2].set(registers.MAX_POSITION, 2300)
     machine = connect_servos(port)
     goal = np.deg2rad([10, -30, 10])  # servo 2 is inverted: 2068 + 341
     with pytest.raises(NoSolutionError, match=r"servo 2 \(j2\): 2409 counts is outside its own limits 1500 to 2300"):
         machine.run([machine.plan(machine.counts(), goal)])
     assert [round(servo.position) for servo in port.servos.values()] == HOME
     machine.run([machine.plan(machine.counts(), np.deg2rad([10, -20, 10]))])
-    port.servos[2].set(registers.MOST, 2000)  # what it stands at is outside: it may come back, not go farther
+    port.servos[2].set(registers.MAX_POSITION, 2000)  # what it stands at is outside: it may come back, not go farther
     two = connect_servos(port)
     with pytest.raises(NoSolutionError, match="outside its own limits 1500 to 2000"):
         two.run([two.plan(two.counts(), np.deg2rad([10, -21, 10]))])

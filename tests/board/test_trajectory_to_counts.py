@@ -124,7 +124,7 @@ def end_tolerance(s: Segment) -> float:
     for that: rounding it to 2^-16 cycle moves its thresholds by T^2 / 2^17 ticks, and a cycle or two are left.
     """
     long = (
-        counts_to_segments.cycles_of(s) > counts_to_segments._EVEN * CLOCK
+        counts_to_segments.cycles_of(s) > counts_to_segments._EVEN_SECONDS * CLOCK
     )  # a shorter one's ticks are of one length, in whole cycles
     rate, even = abs(s.rates[0]), long and abs(s.add) * s.ticks <= 3 << 16
     cycles = min(s.ticks, s.ticks**2 / 2**17 + 2) if even else s.ticks

@@ -8,7 +8,7 @@ import pytest
 
 import armkin
 from armkin.errors import NoSolutionError, PathFileError
-from armkin.teach.recorded_program import MOST, Program
+from armkin.teach.recorded_program import MAX_MOVES, Program
 from command_line import ROOT, THREE_DOF, run
 
 START = "moves:\n  - point: [390, 80, 300]\n"
@@ -101,10 +101,10 @@ def test_a_path_of_this_robot_is_planned_by_its_name_and_by_its_file(tmp_path: P
         completed = run("path", arm, file)
         assert completed.code == 0, (robot, completed.err)
     program = Program(armkin.load(mine))
-    program.moves = [{"line": [390.123456, 80.123456, 300.123456]}] * MOST
-    program.names = ["a name of a move"] * MOST
+    program.moves = [{"line": [390.123456, 80.123456, 300.123456]}] * MAX_MOVES
+    program.names = ["a name of a move"] * MAX_MOVES
     program.load(program.text(), "long.yaml")
-    assert len(program.moves) == MOST
+    assert len(program.moves) == MAX_MOVES
     program.load(file.read_text(), "g.yaml")
     program.load(program.text(), "saved.yaml")
     file.write_text(program.text())

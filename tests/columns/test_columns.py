@@ -35,7 +35,7 @@ def test_a_reader_of_csv_gets_every_word_back() -> None:
 
 
 def by_python(table: Table, monkeypatch: pytest.MonkeyPatch) -> tuple[bytes, bytes]:
-    monkeypatch.setattr(csv_and_json_lines, "WORTH", 10**9)
+    monkeypatch.setattr(csv_and_json_lines, "PYARROW_ROWS", 10**9)
     return csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table)
 
 
@@ -54,7 +54,7 @@ def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: 
     assert fast == by_python(table, monkeypatch)
     with monkeypatch.context() as patch:
         patch.setattr(csv_and_json_lines, "BLOCK", 3_333)
-        patch.setattr(csv_and_json_lines, "WORTH", 2_000)
+        patch.setattr(csv_and_json_lines, "PYARROW_ROWS", 2_000)
         assert fast == (csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table))
     names = ["", 'with, comma and "quote"', "right"]
     assert fast[0].splitlines()[7] == b"7,right,1.5e-07,true"

@@ -162,7 +162,7 @@ def test_a_compiler_that_takes_too_long_to_optimise_does_not(
     path.write_text('#!/bin/sh\ncase "$*" in *-O3*) exec sleep 600 ;; esac\nexec cc "$@"\n')
     path.chmod(0o755)
     monkeypatch.setenv("CC", str(path))
-    monkeypatch.setattr(toolchain, "LONGEST", 1.0)
+    monkeypatch.setattr(toolchain, "MAX_SECONDS", 1.0)
     announced: list[str] = []
     monkeypatch.setattr(toolchain, "announce", lambda: announced.append("built"))
     source = 'const char arm_content[] = "slow"; int half(int x) { return x / 2; }\n'

@@ -26,7 +26,7 @@ TEXT = Path(tolerances.__file__).read_text()
 ROOMS = ("singular", "answers", "run")
 # What the rooms of edges compare or divide by besides: starts and stops of iterations, gates before them
 STEPS = {
-    *("NEARBY", "SEED", "HOPELESS", "ARRIVED", "STALLED", "SMOOTH", "FINEST"),  # of Newton's method, of polynomials
+    *("NEARBY", "SEED", "HOPELESS", "ARRIVED", "STALLED", "SMOOTH", "FIRST_POINT"),  # of Newton's method, polynomials
     *("ACROSS", "OFF_CURVE", "CROSSING", "SHORTEST_STEP"),  # of the walker
     *("FOLD_WAY", "BENT", "APART_ROOTS"),  # gates: what they let pass is decided otherwise
     *("TINY", "NO_SIZE", "FAR_DISTANCE"),

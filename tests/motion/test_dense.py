@@ -204,7 +204,7 @@ def test_many_rests_are_planned_at_once_as_each_alone(
 ) -> None:
     saw = CENTRE + np.array([[25.0 * (-1) ** k, 0.5 * k, 0.1 * k] for k in range(14)])
     plan = armkin.path(three_dof, saw, corners="tolerance", jerk=jerk)
-    monkeypatch.setattr(branch_path, "_MANY", 1000)
+    monkeypatch.setattr(branch_path, "_MANY_RESTS", 1000)
     alone = armkin.path(three_dof, saw, corners="tolerance", jerk=jerk)
     assert len(plan.motion.stretches) == len(alone.motion.stretches) == 14  # one leads to the start
     assert plan.duration == pytest.approx(alone.duration, rel=4e-3)
@@ -324,7 +324,7 @@ def test_a_picture_draws_every_corner_of_very_many_points(three_dof: Arm, monkey
     zigzag = CENTRE - [15, 15, 0] + np.stack([30.0 * ((k + 1) // 2 % 2), 0.3 * k, 0 * k], axis=1)
     plan = armkin.path(three_dof, zigzag, corners="tolerance")
     way = picture._tool_way(plan)
-    monkeypatch.setattr(picture, "_MANY", 0)
+    monkeypatch.setattr(picture, "_MANY_POINTS", 0)
     thin = picture._thin_out(way, 0.1)
     assert len(thin) < len(way)
     for drawn, most in ((way, 0.1), (thin, 0.2)):

@@ -254,7 +254,7 @@ def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, mon
 def test_a_path_in_a_scene_is_asked_yaw_by_yaw_and_planned_in_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(places, "FEW", 1)
+    monkeypatch.setattr(places, "PLANS", 1)
     path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
     scene.write_text("keep_out:\n  - box: {min: [200, -600, 0], max: [230, 600, 900]}\n    name: wall\n")
     path.write_text("moves:\n  - point: [420, -60, 170]\n  - line: [420, 60, 170]\n")

@@ -165,7 +165,7 @@ def run_reach(*more: object) -> Result:
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
     """Chunks of a few rings."""
-    monkeypatch.setattr(maps, "SOLVES", 64)
+    monkeypatch.setattr(maps, "CHUNK_SOLVES", 64)
 
 
 @pytest.mark.usefixtures("small")

@@ -19,7 +19,7 @@ from armkin.robot_file.robot_file_text import format_robot_file
 from armkin.robot_file.urdf_document import parse_document
 from armkin.teach.mesh_files import read_triangles
 from armkin.teach.one_file import arm_html
-from armkin.teach.urdf_meshes import MOST, meshes_json
+from armkin.teach.urdf_meshes import MAX_TRIANGLES, meshes_json
 from command_line import run
 
 CORNERS = np.array([[[0, 0, 0], [0.1, 0, 0], [0, 0.2, 0]], [[0, 0, 0], [0, 0.2, 0], [0, 0, 0.3]]])
@@ -125,7 +125,7 @@ def test_a_mesh_of_many_triangles_becomes_coarser(tmp_path: Path) -> None:
     (tmp_path / "arm" / "meshes" / "link.stl").write_bytes(binary_stl(triangles))
     arm = load_urdf(file)
     drawn = meshes_json(arm, str(file))
-    assert 0.2 * MOST < sum(len(drawn_corners(drawn, k)) for k in range(4)) <= MOST
+    assert 0.2 * MAX_TRIANGLES < sum(len(drawn_corners(drawn, k)) for k in range(4)) <= MAX_TRIANGLES
     assert len(arm_html(arm, meshes=drawn)) < 1.5e6
 
 

@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.reachability import voxels
 from armkin.reachability.reach_cells import Grid
 from armkin.teach.actions import Actions
-from armkin.teach.reach_slice import ACROSS, DIRECTIONS, VALUES, reach_slice
+from armkin.teach.reach_slice import DIRECTIONS, VALUES, VOXELS_ACROSS, reach_slice
 
 
 def test_voxels_are_shown_and_hidden_again(browser: Browser) -> None:
@@ -31,7 +31,7 @@ def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
     arm = armkin.load("puma560")
     answer = reach_slice(arm)
     centres = np.reshape(answer["centres"], (-1, 3))
-    assert answer["size"] == pytest.approx(arm.reach / ACROSS)
+    assert answer["size"] == pytest.approx(arm.reach / VOXELS_ACROSS)
     assert answer["of"] == DIRECTIONS
     assert len(centres) == len(answer["shares"]) > 20
     assert (centres[:, 1] == 0).all()
@@ -53,7 +53,7 @@ def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
 
 def test_of_seven_joints_one_of_some_values_must_reach_and_no_task_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     """With J7 at home alone every target of an iiwa7 was singular, and the slice took 25 s."""
-    monkeypatch.setattr("armkin.teach.reach_slice.ACROSS", 4)
+    monkeypatch.setattr("armkin.teach.reach_slice.VOXELS_ACROSS", 4)
     arm = armkin.load("iiwa7")
     answer = reach_slice(arm)
     assert (answer["held"], answer["values"]) == ("J7", VALUES)

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SHARE = 0.1  # share of a joint's max_speed for all that moves here
 STEP = 2.0  # way [deg | mm] that a joint may leave its place while its direction is looked at
 _FIRST = 5.0  # way [deg | mm] that each joint leaves home in the first move
-_LONGEST = 60.0  # length [s], at most, of one jog
+_MAX_JOG = 60.0  # length [s], at most, of one jog
 _VISIBLE = 1.0  # way [mm] that the tool must move to tell a direction by it
 
 
@@ -150,7 +150,7 @@ def jog_by_keys(board: Board, person: Operator, *, narrower: bool = False) -> di
             chosen = _KEYS.index(key)
             person.say(f"{arm.joint_names[chosen]} is chosen.")
         elif key in "+-" and (more := person.held(key)) is not None:
-            _jog_joint(board, person, chosen, 1 if key == "+" else -1, _LONGEST, more)
+            _jog_joint(board, person, chosen, 1 if key == "+" else -1, _MAX_JOG, more)
             person.say(_position_in_words(board))
         elif narrower and key in "[]":
             _narrow_limit(board, person, limits_set, chosen, upper=key == "]")

@@ -13,7 +13,7 @@ from armkin.calibration import observability
 from armkin.calibration.corrected_chain import KINDS, correction_model
 from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check_measurements
-from armkin.calibration.model_selection import LEVELS, MANY, Choice, choose_level, free_at
+from armkin.calibration.model_selection import LEVELS, MANY_ROWS, Choice, choose_level, free_at
 from armkin.calibration.robust_fit import Measurements
 from armkin.errors import UsageError
 from armkin.export import conventions
@@ -211,7 +211,7 @@ def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
 def _must_explain(rows: Measurements, choice: Choice) -> None:
     spread = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
     left = float(np.median(choice.errors[choice.level]))
-    enough = HOPELESS if len(rows) >= MANY else 1.0  # few rows say little of rows they have not seen
+    enough = HOPELESS if len(rows) >= MANY_ROWS else 1.0  # few rows say little of rows they have not seen
     if left > enough * spread:
         raise UsageError(
             f"the rows do not fit this arm: half of them stay more than {left:.3g} mm off, of points {spread:.3g} mm "

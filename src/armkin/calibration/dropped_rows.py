@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array
 
 K = 4.0  # residuals beyond K scales lose three quarters of their weight
 MEDIAN = 1.5382  # median of the length of three standard normal numbers
-FINEST = 0.005, 1e-5  # smallest scale [mm, rad]: what a measurement's last digit is worth
+MIN_SCALES = 0.005, 1e-5  # smallest scale [mm, rad]: what a measurement's last digit is worth
 DROPPED = 0.1  # weight below which a row is called wrong
 
 
@@ -41,7 +41,7 @@ def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_n
         if rotation_residuals is None
         else float(np.median(np.linalg.norm(rotation_residuals, axis=1))) / MEDIAN * used
     )
-    return max(size, FINEST[0]), max(turn, FINEST[1])
+    return max(size, MIN_SCALES[0]), max(turn, MIN_SCALES[1])
 
 
 def dropped_row_numbers(weights: Array) -> NDArray[np.intp]:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 LEAST_ROWS = 4  # rows of a measurement, at least
-STILL = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint does not move
+STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint does not move
 ON_A_LINE = 0.01  # thickness of a cloud on a line, at most, as a share of the rows' length
 FITS = 0.1  # miss, as a share of the rows' spread, that needs no explanation
 EXPLAINS = 0.35  # share of the miss as given that another reading must leave to be the explanation
@@ -36,7 +36,7 @@ def check_measurements(arm: Arm, data_rows: Measurements) -> None:
 
 
 def _check_motion(arm: Arm, rows: Measurements) -> None:
-    least = np.where(arm.prismatic, STILL[1], STILL[0])
+    least = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
     still = np.flatnonzero(np.ptp(rows.c, axis=0) < least)
     if len(still):
         names = ", ".join(arm.joint_names[j] for j in still)

@@ -23,11 +23,11 @@ from armkin.formula.arrays import Array
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
 FOLDS = 5  # parts of the rows, each of which is left out once
 GAIN = 0.97  # share of the squared error, at most, that the first level above the file must leave to be taken
-CERTAIN = 0.5  # gain [standard errors] that the first level must have besides; later levels: 0
-FEW = 18.0  # gain [standard errors] times the number of rows that every level must have on top
-MANY = 10  # rows below which a fit can look good by chance: OPEN holds for it, too
-CLEAR = 0.7  # share of the file's error on unseen rows that base and tool may leave with fewer than MANY rows
-OPEN = 0.5  # share of the file's error that the covariance of a fit to few rows may leave open at the tip
+CERTAIN_GAIN = 0.5  # gain [standard errors] that the first level must have besides; later levels: 0
+FEW_ROWS_GAIN = 18.0  # gain [standard errors] times the number of rows that every level must have on top
+MANY_ROWS = 10  # rows below which a fit can look good by chance: OPEN_SHARE holds for it, too
+CLEAR_SHARE = 0.7  # share of the file's error on unseen rows that base and tool may leave with few rows
+OPEN_SHARE = 0.5  # share of the file's error that the covariance of a fit to few rows may leave open at the tip
 CAP = 4.0  # error [medians] that larger ones count as: one wrong row does not decide
 
 
@@ -56,7 +56,7 @@ def choose_level(
         better = _is_better(errors[level], errors[richer], first=not sure)
         if not better and not (richer == 1 and _is_clearly_better(errors)):
             continue
-        if len(rows) >= MANY or _is_settled(model, fits[richer], errors[0]):
+        if len(rows) >= MANY_ROWS or _is_settled(model, fits[richer], errors[0]):
             level, sure = richer, better
     return Choice(level, errors, fits[level])
 
@@ -109,14 +109,14 @@ def _five_parts(count: int) -> list[NDArray[np.intp]]:
 
 
 def _is_settled(model: Model, candidate: Fit, before: Array) -> bool:
-    """Whether the fit's covariance leaves less of the tip's place open than OPEN times the file's error."""
-    return left_open(model, candidate) < OPEN * float(np.sqrt(np.mean(before**2)))
+    """Whether the fit's covariance leaves less of the tip's place open than OPEN_SHARE times the file's error."""
+    return left_open(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(before**2)))
 
 
 def _is_clearly_better(errors: Array) -> bool:
     """Whether few rows, each predicted without itself, are met clearly better with another base and tool."""
     file, placed = np.sqrt(np.mean(errors[:2] ** 2, axis=1))
-    return errors.shape[1] < MANY and bool(placed <= CLEAR * file)
+    return errors.shape[1] < MANY_ROWS and bool(placed <= CLEAR_SHARE * file)
 
 
 def _is_better(simple: Array, rich: Array, *, first: bool) -> bool:
@@ -127,5 +127,5 @@ def _is_better(simple: Array, rich: Array, *, first: bool) -> bool:
     a, b = (np.minimum(errors, CAP * np.median(errors)) ** 2 for errors in (simple, rich))
     gain = a - b
     chance = float(gain.std(ddof=1) / np.sqrt(len(gain)))
-    most, certain = (GAIN, CERTAIN) if first else (1.0, 0.0)
-    return bool(b.mean() <= most * a.mean() and gain.mean() > (certain + FEW / len(gain)) * chance)
+    most, certain = (GAIN, CERTAIN_GAIN) if first else (1.0, 0.0)
+    return bool(b.mean() <= most * a.mean() and gain.mean() > (certain + FEW_ROWS_GAIN / len(gain)) * chance)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.calibration.corrected_chain import Model
-from armkin.calibration.dropped_rows import FINEST
+from armkin.calibration.dropped_rows import MIN_SCALES
 from armkin.calibration.robust_fit import Fit
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 UNSEEN = 0.7  # share of the prior's doubt: a correction of which more is left is not shown by the rows
-TOGETHER = 0.9  # correlation of two corrections from which on only their sum is seen
+SUM_CORRELATION = 0.9  # correlation of two corrections from which on only their sum is seen
 CANDIDATES = 400  # postures among which the next ones to measure are chosen
 UNLIMITED = np.pi, 200.0  # way [rad, mm] that an unlimited joint is moved for a suggestion
 
@@ -47,7 +47,7 @@ def unseen_corrections(model: Model, fit: Fit) -> list[str]:
     for k in weak:
         if k in grouped:
             continue
-        group = [k] + [j for j in np.flatnonzero(np.abs(correlation[k]) > TOGETHER) if j != k]
+        group = [k] + [j for j in np.flatnonzero(np.abs(correlation[k]) > SUM_CORRELATION) if j != k]
         grouped.update(int(j) for j in group)
         lines.append(names[k] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
     return lines
@@ -104,4 +104,4 @@ def _random_poses(arm: Arm, count: int) -> Array:
 def _whitened_jacobian(model: Model, c: Array, free: NDArray[np.intp]) -> Array:
     """What the corrections do to the tip, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
     J = model.poses(np.zeros(len(model.parameters)), c)[1][:, :3, free]
-    return np.asarray(J * model.prior[free] / max(0.1, FINEST[0]))
+    return np.asarray(J * model.prior[free] / max(0.1, MIN_SCALES[0]))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from armkin import files
 from armkin.cli import csv_to_numbers
 from armkin.cli.csv_to_numbers import Columns
-from armkin.cli.number_parsing import LARGEST
+from armkin.cli.number_parsing import LIMIT
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
 
@@ -130,7 +130,7 @@ def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
 
     first, absent = piece.first, np.isnan(values)
     keep = np.asarray(~absent.all(axis=1))
-    bad = np.argwhere(~(np.abs(values) <= LARGEST) & keep[:, None])
+    bad = np.argwhere(~(np.abs(values) <= LIMIT) & keep[:, None])
     end = int(bad[0, 0]) if len(bad) else len(values)
     present = np.flatnonzero(keep[:end])
     if len(present):
@@ -141,5 +141,5 @@ def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
     if len(bad):
         row, column = bad[0].tolist()
         value = values[row, column]
-        why = "a number is missing" if np.isnan(value) else f"{value:g} is too large; numbers here go up to {LARGEST:g}"
+        why = "a number is missing" if np.isnan(value) else f"{value:g} is too large; numbers here go up to {LIMIT:g}"
         raise UsageError(f"{piece.source}: row {first + row}: {piece.names[column]}: {why}", row=first + row)

@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_FASTEST = 4_000_000  # rate [bit/s], at most, that USB adapters make; a bus has 1,000,000
+_MAX_BAUD = 4_000_000  # rate [bit/s], at most, that USB adapters make; a bus has 1,000,000
 
 
 def _baud_rate(text: str | None) -> int | None:
-    return None if text is None else whole_number(text, "--baud", 1, _FASTEST)
+    return None if text is None else whole_number(text, "--baud", 1, _MAX_BAUD)
 
 
 Baud = Annotated[

@@ -14,7 +14,7 @@ from typing import IO, TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.number_parsing import LARGEST, numbers
+from armkin.cli.number_parsing import LIMIT, numbers
 from armkin.cli.row_chunks import ROWS as ROWS
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import FileError, UsageError
@@ -22,8 +22,8 @@ from armkin.errors import FileError, UsageError
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
 
-WORTH = 2_000  # rows from which on pyarrow is worth its import
-LONGEST = 100_000  # characters of a line, at most: what is longer is no CSV file
+PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
+MAX_LINE = 100_000  # characters of a line, at most: what is longer is no CSV file
 SIZE = 1 << 18  # characters read at once
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
@@ -95,11 +95,11 @@ class Columns:
             values = _regular_numbers(text, width)
             if values is not None and self.places is not None:
                 values = values[:, self.places]
-        elif self.places is not None and b'"' not in text and len(max(lines := text.split(b"\n"), key=len)) < LONGEST:
+        elif self.places is not None and b'"' not in text and len(max(lines := text.split(b"\n"), key=len)) < MAX_LINE:
             values = _among_others([line.split(b",") for line in lines], width, self.places)
         else:
             return None
-        return values if values is not None and np.abs(values).max() <= LARGEST else None
+        return values if values is not None and np.abs(values).max() <= LIMIT else None
 
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
@@ -198,11 +198,11 @@ def _regular_numbers(text: bytes, width: int) -> Array | None:
     if len(ends) + 1 != rows * width or not ends[width - 1 :: width].all():
         return None
     if (
-        len(text) >= LONGEST
-        and np.diff(np.flatnonzero(marks == ord("\n")), prepend=-1, append=len(text)).max() > LONGEST
+        len(text) >= MAX_LINE
+        and np.diff(np.flatnonzero(marks == ord("\n")), prepend=-1, append=len(text)).max() > MAX_LINE
     ):
         return None
-    if rows >= WORTH and (values := _by_arrow(text, width)) is not None:
+    if rows >= PYARROW_ROWS and (values := _by_arrow(text, width)) is not None:
         return values
     try:
         return np.array([float(cell) for cell in text.replace(b"\n", b",").split(b",")]).reshape(rows, width)
@@ -250,7 +250,7 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
 
 
 def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
-    """The text in blocks of ROWS lines, each as soon as it can be read; a line of LONGEST characters ends it."""
+    """The text in blocks of ROWS lines, each as soon as it can be read; a line of MAX_LINE characters ends it."""
     held: list[bytes] = []
     lines = open_ = 0  # lines that end in what is held, and characters behind them
     while text := _read_available(file, source):
@@ -262,7 +262,7 @@ def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
             lines = open_ = 0
         held.append(text)
         lines, open_ = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_ + len(text)
-        if open_ >= LONGEST:  # no use in reading on
+        if open_ >= MAX_LINE:  # no use in reading on
             break
     if last := b"".join(held):
         yield last
@@ -291,7 +291,7 @@ def line_count(block: bytes) -> int:
 
 def _read_line(file: IO[bytes], source: str) -> bytes:
     try:
-        return file.readline(LONGEST)
+        return file.readline(MAX_LINE)
     except (OSError, ValueError) as error:  # ValueError: closed
         raise _read_error(source, error) from None
 
@@ -344,8 +344,8 @@ def _text_of(line: bytes, encoding: str) -> str:
         raise UsageError("this is no UTF-8 text") from None
     if "\0" in text:
         raise UsageError("this is no CSV of numbers: it holds a NUL byte")
-    if len(line) >= LONGEST:
-        raise UsageError(f"this is no CSV of numbers: a line has at most {LONGEST - 1:,} bytes")
+    if len(line) >= MAX_LINE:
+        raise UsageError(f"this is no CSV of numbers: a line has at most {MAX_LINE - 1:,} bytes")
     return text
 
 

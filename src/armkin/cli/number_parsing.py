@@ -6,15 +6,15 @@ from collections.abc import Sequence
 from armkin.errors import UsageError
 
 # Far beyond any arm, in degrees or mm: what is larger is a slip, and would drown in rounding.
-LARGEST = 1e9
+LIMIT = 1e9
 NOT_FINITE = ("nan", "inf", "infinity")
 
 _PI = r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?"
 _NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]++)?")
-_LONGEST = 10_000  # characters of a number, at most
+_MAX_DIGITS = 10_000  # characters of a number, at most
 
 
-def number(text: str, name: str, largest: float = LARGEST) -> float:
+def number(text: str, name: str, largest: float = LIMIT) -> float:
     """One finite number up to `largest` in size; name: what it is, for the message.
 
     >>> number("-1e3", "q1")
@@ -22,7 +22,7 @@ def number(text: str, name: str, largest: float = LARGEST) -> float:
     """
     plain = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
     shown = text if len(text) <= 40 else text[:37] + "..."
-    if len(plain) > _LONGEST:
+    if len(plain) > _MAX_DIGITS:
         raise UsageError(f"{name}: '{shown}' is too long for a number", argument=name, value=shown)
     if not _NUMBER.fullmatch(plain):
         raise UsageError(f"{name}: {_refusal_reason(plain, shown)}", argument=name, value=shown)

@@ -10,7 +10,7 @@ from typing import Any, Protocol, TextIO
 
 Write = Callable[[str], object]
 _COLOURS = {"note": "36", "warning": "33", "error": "31"}
-_LONGEST = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line at most; an error may quote a long word
+_MAX_LINE = {"error": 240, "warning": 1000, "note": 1000}  # characters of a line; an error may quote a long word
 TEXT = (".txt", ".json")  # endings of an answer in a file
 _broken: list[str] = []  # words of the command line that have line breaks in them
 _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warnings so far
@@ -116,7 +116,7 @@ def flush() -> None:
 
 def _one_line(message: str, word: str) -> str:
     """A message for programs; what is a line of its own for people follows a semicolon, or a sentence's end."""
-    lines = [_printable_text(line.strip(), _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable_text(line.strip(), _MAX_LINE[word]) for line in message.splitlines() if line.strip()]
     text = "".join(lines[:1])
     for line in lines[1:]:
         text += f" {line}" if text[-1] in ".?!;:" else f"; {line}"
@@ -154,7 +154,7 @@ def _print_message(word: str, message: str) -> None:
         return
     head = f"\x1b[{_COLOURS[word]}m{word}:\x1b[0m" if _is_coloured(sys.stderr) else f"{word}:"
     # A file's name may hold anything: two lines of printable text, whatever it is.
-    lines = [_printable_text(line, _LONGEST[word]) for line in message.splitlines() if line.strip()]
+    lines = [_printable_text(line, _MAX_LINE[word]) for line in message.splitlines() if line.strip()]
     text = "\n".join(f"{head} {line}" if i == 0 else f"  {line}" for i, line in enumerate(lines))
     _print_line(text)
 

@@ -13,7 +13,7 @@ from armkin.errors import FileError, NoSolutionError, UsageError
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_LARGEST = 32_000_000  # size [bytes], at most, of standard input: some 50,000 answers
+_MAX_BYTES = 32_000_000  # size [bytes], at most, of standard input: some 50,000 answers
 _TOOL = ("xyz", "rpy")
 _NO_JSON = "standard input is no JSON: give --json to the command before the pipe"
 
@@ -145,7 +145,7 @@ def _stdin_text() -> str:
     if sys.stdin is None or sys.stdin.isatty():
         return ""
     try:
-        return arguments.standard_input(_LARGEST, ": give rows to --batch - instead").decode("utf-8-sig")
+        return arguments.standard_input(_MAX_BYTES, ": give rows to --batch - instead").decode("utf-8-sig")
     except UnicodeDecodeError:
         raise UsageError(_NO_JSON) from None
 

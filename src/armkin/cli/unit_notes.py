@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 _METRES = 2.0  # distance [mm]: a target this near to the base, or an arm this short, was meant in metres
 _RADIANS = 3.2  # angle [deg]: a little more than pi
-_BIG = 50.0  # reach [mm] of an arm whose file is certainly in mm
+_BIG_REACH = 50.0  # reach [mm] of an arm whose file is certainly in mm
 _TURNS = (math.pi / 2, math.pi)
 
 
@@ -63,7 +63,7 @@ def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values"
 def note_target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
     """A position within 2 mm of the base's origin, asked of an arm of ordinary size."""
     position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
-    if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG:
+    if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG_REACH:
         output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
     angles = [v for v, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
     if any(map(_has_digits, angles)) and any(map(_is_turn, angles)):

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from armkin.columns.csv_cells import csv_cell
 from armkin.columns.table import Column, Table, Words, row_count, take_rows
 
-WORTH = 2_000  # rows from which on pyarrow is worth its import
+PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
 BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
 
 
@@ -42,7 +42,7 @@ def to_json_lines(table: Table, lines: Lines | None = None) -> bytes:
 def _print_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
     """See `Lines`."""
     count = row_count(table)
-    if count >= WORTH and (arrow := _import_arrow()) is not None:
+    if count >= PYARROW_ROWS and (arrow := _import_arrow()) is not None:
         parts = (table if count <= BLOCK else take_rows(table, slice(i, i + BLOCK)) for i in range(0, count, BLOCK))
         return b"".join([_print_by_arrow(arrow, block, between, quoted, missing) for block in parts])
     columns = [_column_texts(column, quoted, missing) for column in table.values()]

@@ -20,7 +20,7 @@ from typing import IO, Any
 from armkin.errors import FileError, UnfinishedError, UsageError
 
 HANDED_ON = 2.0  # time [s] until the processes of a run that was killed have ended, too
-_ASIDE = ".writing"  # ending of the name of what is not whole yet
+_UNFINISHED = ".writing"  # ending of the name of what is not whole yet
 
 
 class Parts:
@@ -75,7 +75,7 @@ class Parts:
             except BaseException:
                 self.leave()
                 raise
-            for left in self.folder.glob(f"*{_ASIDE}"):
+            for left in self.folder.glob(f"*{_UNFINISHED}"):
                 left.unlink()
 
     def _check_job(self) -> None:
@@ -145,7 +145,7 @@ class Parts:
         return self.folder / f"{number:08d}"
 
     def _write(self, place: Path, *data: bytes) -> None:
-        aside = Path(f"{place}{_ASIDE}")
+        aside = Path(f"{place}{_UNFINISHED}")
         try:
             with open(aside, "wb") as file:
                 file.writelines(data)

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.compiled import c_source, elimination_rows, toolchain
 from armkin.compiled.batch_results import Results
-from armkin.compiled.joint_functions import WORTH, JointFunctions
+from armkin.compiled.joint_functions import THREAD_POSES, JointFunctions
 from armkin.compiled.one_target import Single
 from armkin.errors import UsageError
 from armkin.export.c import c_program
@@ -318,7 +318,7 @@ class _CompiledTask:
             count = rows.stop - rows.start
             return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
 
-        least = WORTH if self.geometry.pairs is not None else WORTH // 64
+        least = THREAD_POSES if self.geometry.pairs is not None else THREAD_POSES // 64
         left = sum(share_rows(solve_part, len(target), workers, least))
         if left and not read and (batch.state == UNREAD).any():
             return None

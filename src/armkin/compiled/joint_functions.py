@@ -17,7 +17,7 @@ from armkin.keep_out.clearance import Clearance, clearance, least_clearances, na
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-WORTH = 8192  # poses of a closed form from which on a thread pays
+THREAD_POSES = 8192  # poses of a closed form from which on a thread pays
 
 
 class JointFunctions:
@@ -58,7 +58,7 @@ class JointFunctions:
             pointers = (a[rows].ctypes.data for a in (flat, results, wild))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(share_rows(run_part, len(flat), workers, WORTH)):
+        if sum(share_rows(run_part, len(flat), workers, THREAD_POSES)):
             far = np.flatnonzero(wild)
             results[far] = python(self.arm, flat[far])
         return results.reshape(*values.shape[:-1], *shape)

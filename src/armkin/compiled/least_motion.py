@@ -16,13 +16,13 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import EQUAL
 
 SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
-MOST = 7  # joints, at most, that numpy adds up from left to right
+MAX_JOINTS = 7  # joints, at most, that numpy adds up from left to right
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
     """See `armkin.columns.ik_columns.nearest_branches`; None for more joints than are added up one after the other."""
     N, B, n = q.shape
-    if n > MOST:
+    if n > MAX_JOINTS:
         return None
     branch, motion, away = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
     inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), away

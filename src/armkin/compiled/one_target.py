@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 LEFT = 4  # what `arm_single` returns for a target that it leaves to Python
-_FLAGS, _SMALL = np.dtype(np.bool_), np.dtype(np.int8)
+_BOOL, _INT8 = np.dtype(np.bool_), np.dtype(np.int8)
 
 
 def _read_only(value: object) -> NDArray[Any]:
@@ -95,7 +95,7 @@ class Single:
         if state == LEFT:
             return None
         values = results.copy()
-        flags, rows = values.view(_FLAGS), self._branches
+        flags, rows = values.view(_BOOL), self._branches
         if self._names is not None:
             rows = int(flags[self._bytes : self._bytes + rows].sum())
         q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._split_block(rows)
@@ -107,7 +107,7 @@ class Single:
             q=values[q].reshape(shape),
             valid=flags[valid],
             within_limits=flags[within],
-            branch=values.view(_SMALL)[branch],
+            branch=values.view(_INT8)[branch],
             free=flags[free],
             status=_STATUS[state],
         )

@@ -15,8 +15,8 @@ from armkin.columns.table import Column, Table, Words, row_count, take_rows
 from armkin.compiled import toolchain
 
 SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
-LEAST, MOST = -292, 324  # powers of ten, least and greatest, that doubles need
-WIDEST = 25  # characters of a number: -2.2250738585072014e-308
+MIN_EXP, MAX_EXP = -292, 324  # powers of ten, least and greatest, that doubles need
+MAX_WIDTH = 25  # characters of a number: -2.2250738585072014e-308
 SPARE = 64  # characters behind the last one that C may write
 BLOCK = 4_096  # rows printed at once: their text stays in the cache
 
@@ -30,7 +30,7 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
     flat = [text.encode() for parts in cells for text in parts]
     ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
     first = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
-    width = sum(map(len, between)) + len(table) * max(WIDEST, *map(len, flat))
+    width = sum(map(len, between)) + len(table) * max(MAX_WIDTH, *map(len, flat))
     words, buffer = b"".join(flat), np.empty(min(count, BLOCK) * width + SPARE, np.uint8)
     printed = []
     for start in range(0, count, BLOCK):
@@ -71,9 +71,9 @@ def _column_values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
 @cache
 def _library() -> Any:
     """`arm_lines` of parts/table_lines.c. Raises MissingExtraError without a C compiler."""
-    powers = ",\n".join(f"    {{{_hex(high)}, {_hex(low)}}}" for high, low in map(_power, range(LEAST, MOST + 1)))
+    powers = ",\n".join(f"    {{{_hex(high)}, {_hex(low)}}}" for high, low in map(_power, range(MIN_EXP, MAX_EXP + 1)))
     text = SOURCE.read_text(encoding="utf-8").replace("@powers@", powers)
-    text = text.replace("@least@", str(LEAST)).replace("@count@", str(MOST - LEAST + 1))
+    text = text.replace("@least@", str(MIN_EXP)).replace("@count@", str(MAX_EXP - MIN_EXP + 1))
     text = text.replace("@pairs@", "".join(f"{i:02d}" for i in range(100)))
     content = hashlib.sha256(text.encode()).hexdigest()
     function = toolchain.load_library(text.replace("@content@", content), content, 2).arm_lines

@@ -31,7 +31,7 @@ from armkin.errors import FileError, MissingExtraError
 FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
 _DAY = 86_400.0  # day [s]
-LONGEST = 60.0  # time [s] that optimising may take; three_dof takes 2, an arm by elimination 8
+MAX_SECONDS = 60.0  # time [s] that optimising may take; three_dof takes 2, an arm by elimination 8
 
 
 def announce() -> None:
@@ -69,7 +69,7 @@ def load_library(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     """A C file as a loaded library: from the cache, or built now.
 
     content: what the library must hold as `arm_content`; level: of optimisation, or none where that takes the
-    compiler longer than LONGEST. Raises MissingExtraError without a compiler, or if it fails; FileError where there is
+    compiler over MAX_SECONDS. Raises MissingExtraError without a compiler, or if it fails; FileError where there is
     no place to build.
     """
     folder, commands = _cache_folder(), {}
@@ -101,7 +101,7 @@ def _build(commands: dict[str, list[str]], source: str, folder: Path) -> tuple[P
     (folder / "arm.c").write_text(source, encoding="utf-8")
     for name, command in commands.items():
         run = _run_compiler(
-            [*command, "arm.c", "-o", "arm.so", "-lm"], folder, LONGEST if name != [*commands][-1] else None
+            [*command, "arm.c", "-o", "arm.so", "-lm"], folder, MAX_SECONDS if name != [*commands][-1] else None
         )
         if run is not None:
             break
@@ -193,7 +193,7 @@ def _stored_library(folder: Path, name: str, content: str) -> ctypes.CDLL | None
 
 @cache
 def _compiler_version(path: str) -> str:
-    run = _run_compiler([path, "--version"], seconds=LONGEST)
+    run = _run_compiler([path, "--version"], seconds=MAX_SECONDS)
     return "" if run is None else run.stdout
 
 

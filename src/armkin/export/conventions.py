@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 COORDINATES = 1e-9  # error [mm], at most, of the arm's poses by a table
 PARALLEL = 1e-13  # angle [rad] of axes that have no common normal of their own
-LEAST = 1e-11  # distance [mm] below which it is rounding
+MIN_DISTANCE = 1e-11  # distance [mm] below which it is rounding
 
 _GEOMETRY = ("convention", "base", "tool", "zero_pose", "joints")
 
@@ -129,14 +129,14 @@ def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Ar
     # A row's frame has its x axis across the joint's axis, and meets it: Denavit and Hartenberg's two conditions.
     x, p = inner[:3, 0], inner[:3, 3]
     a = float(x[:2] @ p[:2])
-    if abs(x[2]) < 1e-14 and np.abs(p[:2] - a * x[:2]).max() < LEAST:
+    if abs(x[2]) < 1e-14 and np.abs(p[:2] - a * x[:2]).max() < MIN_DISTANCE:
         return _Normal(theta, float(p[2]), a, math.atan2(inner[2, 1], inner[2, 2])), tool
     return _Normal(0.0, 0.0, 0.0, 0.0), link
 
 
 def _is_screw_along_z(T: Array) -> bool:
     """Whether a transform turns about and shifts along z alone."""
-    return bool(np.hypot(T[0, 2], T[1, 2]) < 1e-14 and T[2, 2] > 0 and np.hypot(T[0, 3], T[1, 3]) < LEAST)
+    return bool(np.hypot(T[0, 2], T[1, 2]) < 1e-14 and T[2, 2] > 0 and np.hypot(T[0, 3], T[1, 3]) < MIN_DISTANCE)
 
 
 def _common_normal(link: Array) -> _Normal:
@@ -149,7 +149,7 @@ def _common_normal(link: Array) -> _Normal:
     sine = math.hypot(z[0], z[1])
     if sine <= PARALLEL:
         a = math.hypot(p[0], p[1])
-        a = a if a > LEAST else 0.0
+        a = a if a > MIN_DISTANCE else 0.0
         theta = math.atan2(p[1], p[0]) if a else 0.0
         if not _is_forward(theta):
             a, theta = -a, theta - math.copysign(math.pi, theta)
@@ -158,7 +158,7 @@ def _common_normal(link: Array) -> _Normal:
     else:
         n = np.array([-z[1], z[0]]) / sine
         alpha, a = math.atan2(sine, z[2]), float(n @ p[:2])
-        a = a if abs(a) > LEAST else 0.0
+        a = a if abs(a) > MIN_DISTANCE else 0.0
         theta = math.atan2(n[1], n[0])
         if not _is_forward(theta):
             n, a, alpha = -n, -a, -alpha

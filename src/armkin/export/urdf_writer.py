@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 METRE = 1000.0  # metre [mm]
-THICK = 0.035  # radius of a link, as a share of the reach
-SHORTEST = 1e-6  # length [mm] below which a piece is not drawn
+LINK_RADIUS = 0.035  # radius of a link, as a share of the reach
+MIN_LENGTH = 1e-6  # length [mm] below which a piece is not drawn
 
 _COLOURS = (("body", "0.85 0.85 0.85 1"), ("joint", "0.25 0.35 0.5 1"))
 
@@ -40,7 +40,7 @@ def urdf_text(arm: Arm) -> str:
     links = ["base_link"]
     for name in arm.joint_names:
         links.append(_free_name(f"{name}_link", tuple(links)))
-    radius, form = THICK * arm.reach, arm_shape(turned)
+    radius, form = LINK_RADIUS * arm.reach, arm_shape(turned)
     lines = [
         '<?xml version="1.0"?>',
         f"<!-- {_comment_text(arm)} -->",
@@ -127,7 +127,7 @@ def _piece_lines(start: Array, end: Array, radius: float) -> list[str]:
     """A cylinder from start to end [mm] in the link's frame, with a ball at its end; [] if there is no way between."""
     along = end - start
     length = float(np.linalg.norm(along))
-    if length < SHORTEST:
+    if length < MIN_LENGTH:
         return []
     z = along / length
     # Ry(pitch) after Rz(yaw) turns z into the piece's direction; a cylinder needs no more.

@@ -13,7 +13,7 @@ from armkin.errors import LinkError
 
 _PROGRAMMERS = {"atmega328p": "arduino", "atmega2560": "wiring"}
 _BAR = 50  # marks of avrdude's progress bar
-_LONGEST = 120.0  # time [s] that an upload may take; an Uno takes 7
+_MAX_SECONDS = 120.0  # time [s] that an upload may take; an Uno takes 7
 
 
 def find_avrdude() -> str | None:
@@ -34,7 +34,7 @@ def write_image(
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     except OSError as error:
         raise LinkError(f"avrdude does not start: {error.strerror}") from None
-    late = threading.Timer(_LONGEST, process.kill)
+    late = threading.Timer(_MAX_SECONDS, process.kill)
     late.start()
     with process:
         try:
@@ -46,7 +46,7 @@ def write_image(
             in_time = late.is_alive()
             late.cancel()
     if not in_time:
-        raise LinkError(f"avrdude did not end within {_LONGEST:.0f} s")
+        raise LinkError(f"avrdude did not end within {_MAX_SECONDS:.0f} s")
     if process.returncode:
         lines = [line for line in text.splitlines() if line.strip() and "#" not in line]
         complaints = [line for line in lines if "rror" in line and "ioctl" not in line]

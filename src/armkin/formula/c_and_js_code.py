@@ -41,7 +41,7 @@ _C = {
     "maximum": "{1} > {0} ? {1} : {0}",
     "minimum": "{1} < {0} ? {1} : {0}",
 }
-SMALLEST = 1e-30  # constant of a formula that stands for "next to nothing" in single precision
+MIN_CONSTANT = 1e-30  # constant of a formula that stands for "next to nothing" in single precision
 
 
 _COMPARISONS = {"less": "<", "less_equal": "<=", "greater": ">", "greater_equal": ">=", "equal": "==="}
@@ -87,8 +87,8 @@ def number_text(value: float, single: bool = False) -> str:
         return f"{'-' if value < 0 else ''}ARM_INFINITY"
     if not single:
         return repr(float(value))
-    if value != 0.0 and abs(value) < SMALLEST:
-        value = math.copysign(SMALLEST, value)
+    if value != 0.0 and abs(value) < MIN_CONSTANT:
+        value = math.copysign(MIN_CONSTANT, value)
     text = str(np.float32(value))
     return f"{text}f"
 

@@ -41,7 +41,7 @@ _PYTHON = {
     "where": "{1} if {0} else {2}",
 }
 _FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "atan2", "copysign")}
-DEEPEST = 20  # brackets within brackets, at most, that a line may have: Python's parser takes 200
+MAX_BRACKETS = 20  # brackets within brackets, at most, that a line may have: Python's parser takes 200
 
 Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
 Step = tuple[Value, str, list[Value | str]]  # a value: the operation that it is the result of, and on what
@@ -63,7 +63,7 @@ def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
             continue
         shown = [text(x) for x in args]
         line, depth = _PYTHON[op].format(*(t for t, _ in shown)), 1 + max(d for _, d in shown)
-        if uses[output] == 1 and depth < DEEPEST:
+        if uses[output] == 1 and depth < MAX_BRACKETS:
             texts[output] = f"({line})", depth
         else:
             name = f"t{len(lines)}"

@@ -16,8 +16,8 @@ from armkin.formula.arrays import Array
 if TYPE_CHECKING:
     from armkin.formula import numpy_code
 
-SMALL = 256  # poses of a batch up to which its buffers are kept: to make them costs more than to fill them
-UNCOPIED = 512  # elements of numpy's buffers: it copies operands repeated on a branch axis if two rows fit
+SMALL_BATCH = 256  # poses of a batch up to which its buffers are kept: to make them costs more than to fill them
+UNCOPIED_ELEMENTS = 512  # elements of numpy's buffers: it copies operands repeated on a branch axis if two rows fit
 CACHE = 4_000_000  # size [bytes] of all buffers: 4 to 6 MB cost the same with 1 MB a core, 9 MB more
 LENGTHS = 16  # lengths of batches for which a thread keeps buffers
 
@@ -38,7 +38,7 @@ class StraightLineCode:
     def at_once(self) -> int:
         """How many poses are worked on at once: fewer than `CHUNK` where buffers of so many would leave the cache."""
         size = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._numpy_code()[1] if b.full_index < 0)
-        return min(arrays.CHUNK, max(CACHE // size, SMALL))
+        return min(arrays.CHUNK, max(CACHE // size, SMALL_BATCH))
 
     def _numpy_code(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
         """The code for batches, and what buffers it needs."""
@@ -57,7 +57,7 @@ class StraightLineCode:
         if length in stored:
             return stored[length]
         buffers = numpy_code.workspace(needed, length)
-        if length <= SMALL:
+        if length <= SMALL_BATCH:
             if len(stored) >= LENGTHS:
                 stored.clear()
             stored[length] = buffers
@@ -66,9 +66,9 @@ class StraightLineCode:
     def run(self, inputs: Sequence[Any], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
         """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
         assert self._batch is not None  # written for the workspace
-        if len(inputs[0]) < 2 * UNCOPIED:
+        if len(inputs[0]) < 2 * UNCOPIED_ELEMENTS:
             return self._batch[0](*inputs, *workspace)
-        before = np.setbufsize(UNCOPIED)
+        before = np.setbufsize(UNCOPIED_ELEMENTS)
         try:
             return self._batch[0](*inputs, *workspace)
         finally:

@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 STEP = 0.01  # motion [mm] that is not looked into any further
 _FIRST = 16  # intervals that a proof begins with
 _AT_ONCE = 1024  # intervals that are halved together, the earliest ones: a hit is found before all is looked into
-_LEAST = 1e-9  # share of a cell below which no interval is halved
+_MIN_SHARE = 1e-9  # share of a cell below which no interval is halved
 _STRIDES = (64, 8, 1)  # strides of the samples that are looked at first, and in between
-_ROUGH = (0.5, 0.05)  # gap [mm], and share of the least clearance, by which the bound may be below what was seen
+_GAPS = (0.5, 0.05)  # gap [mm], and share of the least clearance, by which the bound may be below what was seen
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class _Round:
         self.hit = int(np.argmax(bad)) if bad.any() else len(places)  # the first place that is one
         self.open: NDArray[np.bool_] = np.asarray((self.bound < least[:-1]).any(axis=1))
         self.open[self.hit :] = False
-        wide = np.diff(places) > _LEAST
+        wide = np.diff(places) > _MIN_SHARE
         stuck = self.open & ~((self.bound < least[:-1]) & (moved >= STEP) & wide[:, None]).any(axis=1)
         self.stuck = int(np.argmax(stuck)) if stuck.any() else len(places)  # the first interval that ends undecided
         self.open[self.stuck :] = False
@@ -124,7 +124,7 @@ class _Round:
         if tight and not len(rows) and self.hit == self.stuck == len(self.places):
             bounds = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
             seen = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
-            rows = np.flatnonzero(bounds < seen - max(_ROUGH[0], _ROUGH[1] * seen)) if np.isfinite(seen) else rows
+            rows = np.flatnonzero(bounds < seen - max(_GAPS[0], _GAPS[1] * seen)) if np.isfinite(seen) else rows
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
         cell_end = np.round((low + high) / 2)  # a cell's end, where several cells are between

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch
 
 _STEP = 0.002  # step [s] of the plan's time between grid points
-_SHORT = 0.05  # length [s] of the plan's time below which what is left is slow, and as good as straight
+_SHORT_TIME = 0.05  # length [s] of the plan's time below which what is left is slow, and as good as straight
 
 
 def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stretch:
@@ -40,7 +40,7 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stre
         fastest = straight_move(arm, standing, stretch.end).law
         top, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
         return Straight(standing, stretch.end, trapezoid(1.0, top, accel) if fastest.length else fastest)
-    if left < _SHORT:
+    if left < _SHORT_TIME:
         return straight_move(arm, standing, stretch.end)
     s = _grid_times(stretch, begin)
     path = Knots(s, stretch.evaluate(s), stretch.evaluate(s, 1))

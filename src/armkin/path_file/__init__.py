@@ -27,13 +27,13 @@ from armkin.robot_file import catalogue, strict_yaml
 if TYPE_CHECKING:
     from armkin.path_file.drawing import DrawingOptions, Placing
 
-LARGEST = 32_000_000  # size [bytes], at most, of a path file
+MAX_BYTES = 32_000_000  # size [bytes], at most, of a path file
 _KIND = strict_yaml.Kind(
     "path file", "moves", "moves: and a list; rows of CSV belong into a .csv file", 4 * 1024 * 1024, 100_000
 )
 _FOREIGN = {".gcode": "gcode", ".gco": "gcode", ".nc": "gcode", ".ngc": "gcode", ".svg": "svg"}
 __all__ = [
-    "LARGEST",
+    "MAX_BYTES",
     "Move",
     "PathFile",
     "check_robot",
@@ -76,13 +76,13 @@ def read_drawing(name: str, placing: Placing, options: DrawingOptions) -> PathFi
 def _read_bytes(name: str) -> bytes:
     try:
         with open(name, "rb") as file:
-            raw = file.read(LARGEST + 1)
+            raw = file.read(MAX_BYTES + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         hint = _similar_files_text(name) if isinstance(error, FileNotFoundError) else ""
         raise FileError(f"{name}: cannot read the path file: {reason}{hint}", file=name) from None
-    if len(raw) > LARGEST:
-        raise FileError(f"{name} is larger than {LARGEST // 1_000_000} MB: this is no path file", file=name)
+    if len(raw) > MAX_BYTES:
+        raise FileError(f"{name} is larger than {MAX_BYTES // 1_000_000} MB: this is no path file", file=name)
     return raw
 
 

@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.path_keys import LARGEST, LEAST_TOOL_SPEED, MOST_POINTS, Move, PathFile, Source
+from armkin.path_file.path_keys import LEAST_TOOL_SPEED, MAX_NUMBER, MOST_POINTS, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
@@ -96,8 +96,8 @@ def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str
         value, key = _cell_number(cell), columns[i] if i < len(columns) else ""
         if value is None and key in _OPTIONS and not cell.strip():
             continue
-        if value is None or abs(value) > LARGEST:
-            problem = "is no number" if value is None else f"is beyond {LARGEST:g}"
+        if value is None or abs(value) > MAX_NUMBER:
+            problem = "is no number" if value is None else f"is beyond {MAX_NUMBER:g}"
             raise PathFileError(f"{line[0]}:{line[1]}: '{cell[:40]}' {problem}", file=line[0], line=line[1])
         values[key] = value
     if len(row) != len(header or row):

@@ -11,7 +11,7 @@ from armkin.path_file.path_keys import LEAST_TOOL_SPEED, Arc, Circle, Move, Path
 from armkin.robot_file.robot_keys import cross
 
 Point = tuple[float, float, float]
-LARGEST = 1e6  # coordinate [mm], at most
+MAX_COORDINATE = 1e6  # coordinate [mm], at most
 _FULL = 2 * math.pi
 _THREE_POINTS = 1.6 * math.pi  # angle [rad] beyond which a rounded end beside the start makes them another circle's
 _NO_ARC = 1e-6  # length [mm] below which an arc is none

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 
 from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
-from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing, Point
+from armkin.path_file.drawing import MAX_COORDINATE, DrawingOptions, Pen, Placing, Point
 from armkin.path_file.gcode_words import PLAIN, Words, line_error, lines, words_of
 from armkin.path_file.path_keys import MOST_POINTS, PathFile
 
@@ -262,8 +262,8 @@ class _Program:
                 value = number * self.unit
                 start = zero[k] + self.local[k] + self.shift[k] if self.absolute else goal[k]
                 goal[k] = value if machine else start + value
-                if not abs(goal[k]) <= LARGEST:
-                    raise self._error(f"{AXES[k]}{value:g} is farther away than {LARGEST:g} mm")
+                if not abs(goal[k]) <= MAX_COORDINATE:
+                    raise self._error(f"{AXES[k]}{value:g} is farther away than {MAX_COORDINATE:g} mm")
         return goal[0], goal[1], goal[2]
 
     def _move(self, values: dict[str, float], machine: bool) -> None:

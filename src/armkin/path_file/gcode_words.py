@@ -14,7 +14,7 @@ _OWN_WORDS = re.compile(r"\s*(?:N\s*[0-9]+\s*)?(?:M\s*0*([0-9]+)|T\s*([0-9]+))")
 _MACHINE_M = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 30, 48, 49}  # M codes of RS-274: the other words of the line stay words
 _HOME = re.compile(r"\s*(?:N\s*[0-9]+\s*)?G\s*0*28(?![0-9.])")
 _FLAG = re.compile(r"[A-Z](?!\s*[-+.0-9])")  # flag of G28: slicers name axes, and what is left out, without a number
-_LONGEST = 1000  # characters, at most, of a line that is not a comment alone
+_MAX_LINE = 1000  # characters, at most, of a line that is not a comment alone
 _PLACE = r"([+-]?(?:[0-9]{1,15}\.?[0-9]{0,15}|\.[0-9]{1,15}))"
 _FEED = r"(?:F([0-9]{1,15}(?:\.[0-9]{0,15})?) ?)?"
 # most lines of slicers and of CAM programs: G0 or G1 (or neither), F, X, Y, Z, E, F
@@ -85,8 +85,8 @@ def words_of(line: str, name: str, number: int) -> Words:
         speed = re.search(r"\bS\s*([0-9.]+)", line[own_words.end() :])
         word = ("M", float(own_words[1]), f"M{int(own_words[1])}")
         return (word, ("S", _number(speed[1]), "S")) if speed else (word,)
-    if len(line) > _LONGEST:
-        raise line_error(name, number, f"has {len(line)} characters; a line of G-code has at most {_LONGEST}")
+    if len(line) > _MAX_LINE:
+        raise line_error(name, number, f"has {len(line)} characters; a line of G-code has at most {_MAX_LINE}")
     if "28" in line and _HOME.match(line) is not None:
         line = _FLAG.sub(" ", line)
     packed = "".join(line.split())

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, model_validator
 from pydantic_core import PydanticCustomError
 
-LARGEST = 1e7  # size of a number, at most
-Number = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
+MAX_NUMBER = 1e7  # size of a number, at most
+Number = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
 MOST_POINTS = 120_000  # points of a polyline or a spline, and of a CSV file, at most

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from xml.parsers import expat
 
 from armkin.errors import PathFileError
-from armkin.path_file.drawing import LARGEST, DrawingOptions, Pen, Placing
+from armkin.path_file.drawing import MAX_COORDINATE, DrawingOptions, Pen, Placing
 from armkin.path_file.path_keys import MOST_POINTS, PathFile
 from armkin.path_file.svg_shapes import (
     SHAPES,
@@ -25,8 +25,8 @@ from armkin.path_file.svg_shapes import (
 _MM = 25.4 / 96  # pixel [mm]
 _GROUPS = {"svg", "g", "a", "symbol"}
 _REFUSED = {"text", "tspan", "textPath", "image", "foreignObject", "switch"}
-_DEEPEST, _MOST = 64, 200_000  # elements in each other, and in all, at most
-_SAME = 1e-9  # distance [px] of points that are one
+_MAX_DEPTH, _MAX_ELEMENTS = 64, 200_000  # elements in each other, and in all, at most
+_SAME_POINT = 1e-9  # distance [px] of points that are one
 
 
 @dataclass
@@ -102,9 +102,9 @@ class _Reader:
             made.tag = "metadata"
         self._open[-1].children.append(made)
         self._open.append(made)
-        if len(self._open) > 4 * _DEEPEST:
+        if len(self._open) > 4 * _MAX_DEPTH:
             place = f"{self.name}:{made.line}"
-            raise PathFileError(f"{place}: elements in each other deeper than {4 * _DEEPEST}", file=self.name)
+            raise PathFileError(f"{place}: elements in each other deeper than {4 * _MAX_DEPTH}", file=self.name)
 
     def _end(self, tag: str) -> None:
         self._open.pop()
@@ -179,10 +179,10 @@ class _Drawer:
     def _is_drawn(self, element: _Element, depth: int) -> bool:
         """Whether an element can be seen. Raises PathFileError for one that would be drawn wrongly."""
         self.elements += 1
-        if self.elements > _MOST:
-            raise self._error(element, f"is one of more than {_MOST} elements")
-        if depth > _DEEPEST:
-            raise self._error(element, f"stands in others deeper than {_DEEPEST}, or uses itself")
+        if self.elements > _MAX_ELEMENTS:
+            raise self._error(element, f"is one of more than {_MAX_ELEMENTS} elements")
+        if depth > _MAX_DEPTH:
+            raise self._error(element, f"stands in others deeper than {_MAX_DEPTH}, or uses itself")
         if element.tag in _REFUSED:
             raise self._error(element, "is not drawn: make its outlines a path first")
         is_known = element.tag in SHAPES or element.tag in _GROUPS or element.tag == "use"
@@ -212,15 +212,15 @@ class _Drawer:
         self.points += len(stroke)
         if self.points > MOST_POINTS:
             raise self._error(element, f"is beyond {MOST_POINTS} points: give the drawing in parts")
-        if not all(abs(x) <= LARGEST for p in stroke for x in p):
-            raise self._error(element, f"is farther away than {LARGEST:g} mm")
+        if not all(abs(x) <= MAX_COORDINATE for p in stroke for x in p):
+            raise self._error(element, f"is farther away than {MAX_COORDINATE:g} mm")
         line, (x, y) = element.line, stroke[0]
         if self.position is None:
             self.pen.jump((x, y, self.height), line)
-        elif abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME:
+        elif abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME_POINT:
             self.lift()
             self.pen.line((x, y, self.height), None, line)
-        if self.position is None or abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME:
+        if self.position is None or abs(self.position[0] - x) + abs(self.position[1] - y) > _SAME_POINT:
             self._move_to((x, y, 0.0), line)
         for x, y in stroke[1:]:
             self.pen.line((x, y, 0.0), self.options.feed, line)

@@ -8,12 +8,12 @@ from collections.abc import Callable, Mapping
 
 Point = tuple[float, float]
 Matrix = tuple[float, float, float, float, float, float]  # x' = a x + c y + e, y' = b x + d y + f
-CLOSE = 0.002  # distance [mm] of a chord from its curve
+CHORD_DISTANCE = 0.002  # distance [mm] of a chord from its curve
 _TURN = math.radians(8.0)  # turn [rad] of a curve from chord to chord, at most
-_MOST = 20_000  # chords of one curve, at most
+_MAX_CHORDS = 20_000  # chords of one curve, at most
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GAP = re.compile(r"[ \t\r\n]*,?[ \t\r\n]*")
-_LARGEST = 1e9  # size of a number, at most
+_MAX_NUMBER = 1e9  # size of a number, at most
 _NO_RADIUS = 1e-9  # radius below which an arc is a line
 _COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "pt": 4 / 3, "pc": 16.0, "q": 96 / 101.6}
@@ -47,8 +47,8 @@ def above_zero(attributes: Mapping[str, str], *keys: str) -> list[float | None]:
 
 
 def _check_bound(value: float) -> float:
-    if not abs(value) <= _LARGEST:
-        raise ShapeError(f"the number {value:g} is larger than {_LARGEST:g}")
+    if not abs(value) <= _MAX_NUMBER:
+        raise ShapeError(f"the number {value:g} is larger than {_MAX_NUMBER:g}")
     return value
 
 
@@ -196,7 +196,7 @@ class _Outline:
             math.hypot(s[0] - 2 * a[0] + b[0], s[1] - 2 * a[1] + b[1]),
             math.hypot(a[0] - 2 * b[0] + p[0], a[1] - 2 * b[1] + p[1]),
         )
-        n = _chord_count(math.sqrt(6 * bend * self.scale / (8 * CLOSE)), 12 if bend > 1e-12 else 1)
+        n = _chord_count(math.sqrt(6 * bend * self.scale / (8 * CHORD_DISTANCE)), 12 if bend > 1e-12 else 1)
         for k in range(1, n + 1):
             t = k / n
             u = 1 - t
@@ -209,7 +209,7 @@ class _Outline:
     def ellipse(self, c: Point, rx: float, ry: float, turned: float, begin: float, angle: float) -> None:
         """An arc of an ellipse about c, its axes turned [rad], from `begin` over `angle`."""
         size = max(rx, ry) * self.scale
-        step = min(_TURN, 2 * math.acos(1 - min(CLOSE / size, 1.0))) if size > 0 else _TURN
+        step = min(_TURN, 2 * math.acos(1 - min(CHORD_DISTANCE / size, 1.0))) if size > 0 else _TURN
         n = _chord_count(abs(angle) / step, 1)
         cos, sin = math.cos(turned), math.sin(turned)
         for k in range(1, n + 1):
@@ -223,8 +223,8 @@ class _Outline:
 
 
 def _chord_count(count: float, least: int) -> int:
-    if not count <= _MOST:
-        raise ShapeError(f"a curve needs more than {_MOST} chords: is the drawing this large?")
+    if not count <= _MAX_CHORDS:
+        raise ShapeError(f"a curve needs more than {_MAX_CHORDS} chords: is the drawing this large?")
     return max(math.ceil(count), least)
 
 

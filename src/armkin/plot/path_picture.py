@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 _SAMPLES = 600  # samples of what is drawn over time
-_MOST = 160_000  # times, at most, at which speeds and accelerations are looked at
-_MANY = 20_000  # points of the tool's way beyond which they are thinned out
-_FINE = 1 / 1500  # size of a box, as a share of what is seen, that is one point
-_SMALL = 1 / 3  # size of a way, as a share of what is seen, below which it is drawn once more, large
-_WIDE = 84  # characters, at most, of a line above the arm
+_MAX_TIMES = 160_000  # times, at most, at which speeds and accelerations are looked at
+_MANY_POINTS = 20_000  # points of the tool's way beyond which they are thinned out
+_POINT_SIZE = 1 / 1500  # size of a box, as a share of what is seen, that is one point
+_SMALL_WAY = 1 / 3  # size of a way, as a share of what is seen, below which it is drawn once more, large
+_LINE_WIDTH = 84  # characters, at most, of a line above the arm
 _INKED, _WIDTHS = 150.0, (0.1, 0.6)  # width [pt] of a line as long as what is seen is wide, half of it ink; widths [pt]
 _COLOURS = ("#1f77b4", "#d95f02", "#2ca02c", "#9467bd", "#c03d6b", "#8c6d31", "#17a2b8", "#7f7f7f")
-_SINGULAR = "#c0392b"  # colour of a singularity
-_STRAIGHT = "#fbe9e7"  # colour behind what is drawn over time, where the wrist passes a singularity
+_SINGULAR_COLOUR = "#c0392b"  # colour of a singularity
+_STRAIGHT_COLOUR = "#fbe9e7"  # colour behind what is drawn over time, where the wrist passes a singularity
 _INK = "#333333"
 
 
@@ -53,9 +53,9 @@ def plot_path(plan: PathPlan, out: str) -> None:
             axes.grid(True, linewidth=0.4)
             axes.tick_params(labelsize=8)
             for when in _break_times(plan):
-                axes.axvline(when, color=_SINGULAR, linewidth=0.8, linestyle="--")
+                axes.axvline(when, color=_SINGULAR_COLOUR, linewidth=0.8, linestyle="--")
             for begin, end in straight:
-                axes.axvspan(begin, end, color=_STRAIGHT, linewidth=0)
+                axes.axvspan(begin, end, color=_STRAIGHT_COLOUR, linewidth=0)
 
 
 def _wrist_pass_lines(plan: PathPlan) -> list[str]:
@@ -71,7 +71,7 @@ def _wrist_pass_lines(plan: PathPlan) -> list[str]:
 
 def _fine_times(plan: PathPlan, t: Array) -> Array:
     """Times, more of them where the picture's are far apart beside the motion's own changes."""
-    parts = int(np.clip(plan.duration / 0.02 / len(t), 1, _MOST // len(t)))
+    parts = int(np.clip(plan.duration / 0.02 / len(t), 1, _MAX_TIMES // len(t)))
     return np.linspace(0.0, plan.duration, (len(t) - 1) * parts + 1)
 
 
@@ -91,7 +91,7 @@ def _branch_names(plan: PathPlan) -> str:
     """The branches, as many as there is room for beside the joints."""
     names = list(dict.fromkeys(name for run in plan.runs for _, name in run.names if name))
     text = f"on {' | '.join(names)}" if names else ""
-    return text if len(text) <= _WIDE else f"{text[: _WIDE - 4].rstrip(' ,|')} ..."
+    return text if len(text) <= _LINE_WIDTH else f"{text[: _LINE_WIDTH - 4].rstrip(' ,|')} ..."
 
 
 def _break_times(plan: PathPlan) -> list[float]:
@@ -114,7 +114,7 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
         s, value, posture = plan.nearest_singularity
         label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
-        poses.append((label, posture, _SINGULAR, 1.6, (0, (3, 2))))
+        poses.append((label, posture, _SINGULAR_COLOUR, 1.6, (0, (3, 2))))
     starts = _other_starts(plan)
     plural = len(starts) != 1
     label = (
@@ -128,8 +128,8 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     size = float((points.max(axis=0) - points.min(axis=0)).max())
     way = _tool_way(plan)
     small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(way) else size
-    large = small >= _SMALL * size
-    way = _thin_out(way, _FINE * (size if large else small))
+    large = small >= _SMALL_WAY * size
+    way = _thin_out(way, _POINT_SIZE * (size if large else small))
     low, high = (0.03, 0.76) if large else (0.37, 0.44)
     axes = space_axes(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for name, bone, colour, width, dashes in bones:
@@ -140,7 +140,7 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     axes.plot(*(way if len(way) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
     for reconfiguration in plan.reconfigurations:
         tip = position(arm, plan.q(_time_of(plan, reconfiguration.s))[None])
-        axes.plot(*tip.T, color=_SINGULAR, marker="x", markersize=8, linestyle="none")
+        axes.plot(*tip.T, color=_SINGULAR_COLOUR, marker="x", markersize=8, linestyle="none")
     axes.legend(
         loc="upper left",
         bbox_to_anchor=(0.03, 0.88 if plan.passed else 0.90),
@@ -163,7 +163,7 @@ def _tool_way(plan: PathPlan) -> Array:
 
 def _thin_out(way: Array, close: float) -> Array:
     """A way (N, 3) of very many points without those that lie in the same small box as the one before."""
-    if len(way) <= _MANY:
+    if len(way) <= _MANY_POINTS:
         return way
     with np.errstate(invalid="ignore"):
         box = np.rint(way / close)
@@ -189,7 +189,7 @@ def _draw_from_near(plan: PathPlan, figure: Any, way: Array) -> None:
     axes.plot(way[:, i], way[:, j], color=_INK, linewidth=thin, label="the tool's way")
     if plan.rounded_most is not None:
         worst = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
-        axes.plot(worst[i], worst[j], color=_SINGULAR, marker="+", markersize=9, linestyle="none",
+        axes.plot(worst[i], worst[j], color=_SINGULAR_COLOUR, marker="+", markersize=9, linestyle="none",
                   label="farthest from its point")  # fmt: skip
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=2, fontsize=8, borderpad=0.1)
     axes.tick_params(labelsize=7.5)

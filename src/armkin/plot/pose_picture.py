@@ -24,11 +24,11 @@ if TYPE_CHECKING:
     from armkin.keep_out.clearance import Hit
     from armkin.model.arm import Arm
 
-MOST = 20_000  # poses, at most, of one path
-_DRAWN = 40  # poses of a path, evenly spaced, that are drawn as arms
-_BETWEEN = 16  # points of the tip's way from one pose to the next
+MAX_POSES = 20_000  # poses, at most, of one path
+_DRAWN_POSES = 40  # poses of a path, evenly spaced, that are drawn as arms
+_WAY_POINTS = 16  # points of the tip's way from one pose to the next
 _ELEVATION, _AZIMUTHS = 22.0, (-60.0, -30.0)  # directions [deg] of the eye
-_WIDE = 40  # characters of a line that tells what is hit: the legend leaves the arm its room
+_LINE_WIDTH = 40  # characters of a line that tells what is hit: the legend leaves the arm its room
 _HIT, _SOLID = "#d62728", "#7a6a58"  # colours of an arm that hits something and of what it must not touch
 _AXES = ("#d62728", "#2ca02c", "#1f4fd6")  # colours of a frame's x, y and z
 
@@ -112,8 +112,8 @@ def _notes_of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
 def _check_poses(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
     """The poses (K, n); raises UsageError for too many, for other names than poses, and for what is not finite."""
     poses = np.atleast_2d(as_joints(arm, q))
-    if not 1 <= len(poses) <= MOST:
-        raise UsageError(f"{len(poses)} poses in one picture: give 1 to {MOST}")
+    if not 1 <= len(poses) <= MAX_POSES:
+        raise UsageError(f"{len(poses)} poses in one picture: give 1 to {MAX_POSES}")
     if not np.all(np.isfinite(poses)):
         raise UsageError("joint values must be finite to be drawn")
     if names is not None and len(names) != len(poses):
@@ -124,7 +124,7 @@ def _check_poses(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:
 def _legend_texts(names: Sequence[str], legal: Sequence[bool], hit: Sequence[str]) -> list[str]:
     """Names of poses, with what is wrong with them."""
     legend = [name + ("" if is_legal else " (outside limits)") for name, is_legal in zip(names, legal, strict=True)]
-    return ["\n".join([name, *wrap(hit_text, _WIDE)]) for name, hit_text in zip(legend, hit, strict=True)]
+    return ["\n".join([name, *wrap(hit_text, _LINE_WIDTH)]) for name, hit_text in zip(legend, hit, strict=True)]
 
 
 def _hit_texts(arm: Arm, poses: Array) -> list[str]:
@@ -302,12 +302,12 @@ def _from_the_side(arm: Arm) -> tuple[float, float]:
 
 def _spread_indices(count: int) -> NDArray[np.int64]:
     """Indices of the poses of a path that are drawn: its ends, and evenly in between."""
-    return np.unique(np.linspace(0, count - 1, min(count, _DRAWN)).round().astype(np.int64))
+    return np.unique(np.linspace(0, count - 1, min(count, _DRAWN_POSES)).round().astype(np.int64))
 
 
 def _joint_way(poses: Array) -> Array:
     """Joint values along a path (K, n) -> (M, n): straight from each pose to the next, as joints move."""
-    between = max(1, min(_BETWEEN, MOST // len(poses)))
+    between = max(1, min(_WAY_POINTS, MAX_POSES // len(poses)))
     share = np.arange(between)[:, None] / between
     steps = poses[:-1, None] + share * np.diff(poses, axis=0)[:, None]
     return np.concatenate([steps.reshape(-1, poses.shape[1]), poses[-1:]])

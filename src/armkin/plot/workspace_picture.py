@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from armkin.reachability import Workspace
 
 COLOURS = ("manipulability", "step_error", "reach", "z")
-KEEP = 150_000  # samples of a survey that are enough for a picture: more cannot be told apart
+ENOUGH_SAMPLES = 150_000  # samples of a survey that are enough for a picture: more cannot be told apart
 _CLOUD = 20_000  # samples of a survey that are drawn in space
-_EACH = 15  # samples a spot of a projection should have in the mean; below that they are drawn one by one
+_SPOT_SAMPLES = 15  # samples a spot of a projection should have in the mean; below that they are drawn one by one
 
 _LABELS = {
     "manipulability": "manipulability, share of the largest",
@@ -95,7 +95,7 @@ def _far_to_near(tips: Array, azimuth: float) -> Any:
 
 def _draw_spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
     """Mean value on a grid of hexagons of the same size along both axes."""
-    columns = min(columns, int(np.sqrt(len(x) / _EACH)))
+    columns = min(columns, int(np.sqrt(len(x) / _SPOT_SAMPLES)))
     if columns < 50:
         return axes.scatter(x, y, c=values, s=4.0, linewidths=0, cmap="viridis", rasterized=True)
     width, height = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.keep_out_keys import Entry
 
-INSIDE = 1e-6  # depth [mm] to which a base stands in an obstacle by rounding
+ROUNDED_DEPTH = 1e-6  # depth [mm] to which a base stands in an obstacle by rounding
 
 
 class Obstacles(NamedTuple):
@@ -64,7 +64,7 @@ def free_at_place(
     held = guard(stands)
     base = held.bodies.owner == 0
     begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
-    if any((shape.distance(begin, end) < -INSIDE).any() for _, shape in held.obstacles):
+    if any((shape.distance(begin, end) < -ROUNDED_DEPTH).any() for _, shape in held.obstacles):
         return np.zeros(q.shape[:-1], bool)
     return hits_nothing(stands, q)
 

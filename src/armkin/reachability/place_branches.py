@@ -1,6 +1,6 @@
 """Which branches carry a way of the tool from a place: one branch from its first target to its last.
 
-A branch goes on from a target to the next where no joint turns by `FARTHEST` or more between them, so that its copies
+A branch goes on from a target to the next where no joint turns by `MAX_TURN` or more between them, so that its copies
 by whole turns are one way of each joint; all of it lies within the limits, and hits nothing. This asks at targets
 alone: what is between them is proved when the best places are planned.
 """
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.inverse.answers.solutions import Solutions
     from armkin.model.arm import Arm
 
-FARTHEST = 0.5 * math.pi  # turn [rad], at most, of a joint from one target to the next
+MAX_TURN = 0.5 * math.pi  # turn [rad], at most, of a joint from one target to the next
 
 
 def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
@@ -40,7 +40,7 @@ def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
     step[:, :, turning] -= TURN * np.rint(step[:, :, turning] / TURN)
     with np.errstate(invalid="ignore"):
         carries = np.asarray(
-            ~np.isnan(way).any(axis=(0, 2)) & ~(np.abs(step[:, :, turning]) >= FARTHEST).any(axis=(0, 2))
+            ~np.isnan(way).any(axis=(0, 2)) & ~(np.abs(step[:, :, turning]) >= MAX_TURN).any(axis=(0, 2))
         )
     along = np.concatenate([way[:1], way[:1] + np.cumsum(step, axis=0)])
     return carries, along.min(axis=0), along.max(axis=0)

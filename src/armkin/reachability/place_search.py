@@ -53,10 +53,10 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
-MOST = 10**7  # places, at most, of a search
+MAX_PLACES = 10**7  # places, at most, of a search
 SOLVES, ANSWERS = 40_000, 10**7  # solves of a chunk where each place is solved; places of one where most are read off
 Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
-FEW, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
+PLANS, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,7 +261,7 @@ def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, roo
         return replace(place, unplanned=why)
     tried: list[PathFromPlace] = []
     left = place.reached.copy()
-    while left.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < FEW:
+    while left.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
         i, j, k = _best_place(room, left, place.margin)
         xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
         tried.append(place_path.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
@@ -323,8 +323,8 @@ def _axes(
         last = math.floor((end - start) / step + 1e-9)
         before = max(math.ceil((start - low[i]) / step), 0) + 1
         behind = max(math.ceil((high[i] - start) / step) - last, 0) + 1
-        if (last + before + behind + 1) ** 2 * question.yaws > 4 * MOST:
-            raise UsageError(f"more than {MOST:,} places: take a larger step or a smaller area", most=MOST)
+        if (last + before + behind + 1) ** 2 * question.yaws > 4 * MAX_PLACES:
+            raise UsageError(f"more than {MAX_PLACES:,} places: take a larger step or a smaller area", most=MAX_PLACES)
         axes.append(start + np.arange(-before, last + behind + 1) * step)
         inner.append(slice(before, before + last + 1))
     return (axes[0], axes[1]), (inner[0], inner[1])

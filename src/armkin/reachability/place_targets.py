@@ -30,7 +30,7 @@ Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targe
 
 TURNING = ("xy_theta", "xyz_yaw")  # tasks of which an angle turns with the arm
 BLOCK = 8_192  # targets asked together: what is known of them stays in the cache
-BEYOND = 1e-6  # distance [reaches] beyond the reach from which on nothing solves a target
+BEYOND_REACH = 1e-6  # distance [reaches] beyond the reach from which on nothing solves a target
 
 
 class HeldArm(NamedTuple):
@@ -280,7 +280,7 @@ def _within_reach(question: PlaceQuestion, target: NDArray[np.intp], place: Arra
     away = np.zeros((len(p), len(turns)))
     for i in range(p.shape[1]):
         away += ((p[:, i] - (place[:, i] if i < 2 else 0.0))[:, None] - foot[:, i]) ** 2
-    return np.asarray(away <= (arm.reach * (1.0 + BEYOND)) ** 2)
+    return np.asarray(away <= (arm.reach * (1.0 + BEYOND_REACH)) ** 2)
 
 
 def _covered_arcs(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:

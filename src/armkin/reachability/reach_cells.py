@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-MOST = 10**9  # cells of a map, at most
-MOST_ORIENTATIONS = 10**6  # orientations of a cell, at most
+MAX_CELLS = 10**9  # cells of a map, at most
+MAX_ORIENTATIONS = 10**6  # orientations of a cell, at most
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # golden angle [rad]
 STRAIGHT = 1e-9  # sine between axes that are parallel
 
@@ -54,14 +54,14 @@ class Grid:
                 "tasks pose, xyz_axis and those with a pitch do"
             )
         most = self.arm.reach / self.step
-        if most * (2 * most + 1) * self.azimuths > 2 * MOST:
+        if most * (2 * most + 1) * self.azimuths > 2 * MAX_CELLS:
             raise UsageError(
                 f"grid: cells of {self.step:g} mm are some {most * (2 * most + 1) * self.azimuths:.1g} "
-                f"within a reach of {self.arm.reach:.0f} mm; {MOST:,} at most: take a coarser grid",
-                most=MOST,
+                f"within a reach of {self.arm.reach:.0f} mm; {MAX_CELLS:,} at most: take a coarser grid",
+                most=MAX_CELLS,
             )
-        if self.orientations > MOST_ORIENTATIONS:
-            raise UsageError(f"{self.orientations:,} orientations a cell; {MOST_ORIENTATIONS:,} at most")
+        if self.orientations > MAX_ORIENTATIONS:
+            raise UsageError(f"{self.orientations:,} orientations a cell; {MAX_ORIENTATIONS:,} at most")
 
     @cached_property
     def task(self) -> Task:

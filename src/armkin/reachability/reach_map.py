@@ -30,11 +30,11 @@ from armkin.reachability.reach_cells import Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SOLVES = 40_000  # A chunk holds so many solves: about a second with all measures and a closed form.
-SLOWER = 40  # A solve by elimination counts as so many by a closed form.
-FAMILIES = 1_000  # A solve counts as so many where the answers of a pose are curves.
-BLOCK = 2_048  # So many solves are made at once: their words stay in the cache.
-KEEP = 5_000_000  # A result with a file still holds so many cells as arrays.
+CHUNK_SOLVES = 40_000  # A chunk holds so many solves: about a second with all measures and a closed form.
+ELIMINATION_COST = 40  # A solve by elimination counts as so many by a closed form.
+FAMILY_COST = 1_000  # A solve counts as so many where the answers of a pose are curves.
+BLOCK_SOLVES = 2_048  # So many solves are made at once: their words stay in the cache.
+KEPT_CELLS = 5_000_000  # A result with a file still holds so many cells as arrays.
 UNITS = {
     "x_mm": "mm", "y_mm": "mm", "z_mm": "mm", "share": "1", "share_any": "1", "branches": "1", "single": "1",
     "manipulability": "mm^k", "limit_margin": "1", "step_error_mm": "mm",
@@ -162,7 +162,7 @@ def reach(
 def chunks(question: CellQuestion) -> Iterator[RingChunk]:
     """All rings, some at a time; the same ones for every engine."""
     rings = question.grid.rings
-    rings_each = max(SOLVES // _cost(question) // question.solves_a_ring, 1)
+    rings_each = max(CHUNK_SOLVES // _cost(question) // question.solves_a_ring, 1)
     for number, start in enumerate(range(0, len(rings), rings_each)):
         yield RingChunk(number, rings[start : start + rings_each])
 
@@ -171,14 +171,14 @@ def _cost(question: CellQuestion) -> int:
     """How many times as long as by a closed form a solve takes, roughly."""
     arm, task = question.grid.arm, question.grid.task
     if arm.n > task.constraints:
-        return FAMILIES
-    return 1 if solver(actual_arm(arm), task.name)[1].pairs is not None else SLOWER
+        return FAMILY_COST
+    return 1 if solver(actual_arm(arm), task.name)[1].pairs is not None else ELIMINATION_COST
 
 
 def answer_chunk(question: CellQuestion, chunk: RingChunk) -> tuple[int, Table]:
     """The columns of a chunk: a pure function, wherever it runs."""
     grid, M = question.grid, question.grid.azimuths
-    rings_each = max(BLOCK // question.solves_a_ring, 1)
+    rings_each = max(BLOCK_SOLVES // question.solves_a_ring, 1)
     parts = [cell_columns(question, chunk.rings[i : i + rings_each]) for i in range(0, len(chunk.rings), rings_each)]
     cells = len(chunk.rings) * M
     ring = np.repeat(chunk.rings, M, axis=0)
@@ -211,7 +211,7 @@ class _Run:
         """Answer all chunks; the columns, unless they are in a file and too many."""
         kept_tables: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
-        keep = self.parts is None or cells <= KEEP
+        keep = self.parts is None or cells <= KEPT_CELLS
         with kept_chunks.hold_parts(self.parts, len(all_chunks)):
             for number, columns in kept_chunks.chunk_tables(
                 self.engine, answer_chunk, self.question, all_chunks, self.parts

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 1 << 16  # samples in memory at once
-MOST = 10**10  # samples of a survey, at most: about an hour on a desktop computer
+MAX_SAMPLES = 10**10  # samples of a survey, at most: about an hour on a desktop computer
 
 
 def sampled_range(arm: Arm) -> tuple[Array, Array]:
@@ -49,8 +49,8 @@ class Random:
         for name, value in (("samples", self.count), ("seed", self.seed)):
             if isinstance(value, bool) or not isinstance(value, int | np.integer):
                 raise UsageError(f"{name}: {value!r} is no whole number")
-        if not 1 <= self.count <= MOST:
-            raise UsageError(f"{self.count} samples: give 1 to {MOST:,}")
+        if not 1 <= self.count <= MAX_SAMPLES:
+            raise UsageError(f"{self.count} samples: give 1 to {MAX_SAMPLES:,}")
         if self.seed < 0:
             raise UsageError(f"seed {self.seed}: give 0 or more")
         sampled_range(self.arm)
@@ -89,8 +89,8 @@ class JointGrid:
             )
         if min(self.points) < 1:
             raise UsageError(f"a grid needs at least 1 point on every joint, not {min(self.points)}")
-        if self.count > MOST:
-            raise UsageError(f"the grid has {self.count:,} points; {MOST:,} at most")
+        if self.count > MAX_SAMPLES:
+            raise UsageError(f"the grid has {self.count:,} points; {MAX_SAMPLES:,} at most")
         sampled_range(self.arm)
 
     @property

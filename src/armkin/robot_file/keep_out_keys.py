@@ -12,7 +12,7 @@ from pydantic_core import PydanticCustomError
 
 from armkin.robot_file.key_types import Angle, Length, Model
 
-MOST = 256  # entries of a file, at most: each is held against every body
+MAX_ENTRIES = 256  # entries of a file, at most: each is held against every body
 SELF = "self"
 
 Path = tuple[str | int, ...]
@@ -80,8 +80,8 @@ def read_keep_outs(values: Any) -> tuple[Entry, ...]:
     wrong: list[tuple[Path, str]] = []
     if not isinstance(values, tuple | list):
         wrong = [(("keep_out",), f"must be a list; write {EXAMPLE}")]
-    elif len(values) > MOST:
-        wrong = [(("keep_out",), f"{len(values)} entries; a file has at most {MOST}: put a box around several")]
+    elif len(values) > MAX_ENTRIES:
+        wrong = [(("keep_out",), f"{len(values)} entries; a file has at most {MAX_ENTRIES}: put a box around several")]
     else:
         try:
             return ENTRIES.validate_python(tuple(values))

@@ -98,7 +98,7 @@ def add_keep_out_schema(schema: dict[str, Any]) -> dict[str, Any]:
     schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
     schema["$defs"]["Entry"] = made
     items = {"anyOf": [{"const": keep_out_keys.SELF}, {"$ref": "#/$defs/Entry"}]}
-    schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out_keys.MOST}
+    schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out_keys.MAX_ENTRIES}
     return schema
 
 

@@ -30,8 +30,8 @@ from armkin.robot_file.urdf_document import Joint, Tree, is_xacro, parse_documen
 MAX_BYTES = 8 * 2**20
 SNAP = 1e-4  # angle [rad] from a right angle that counts as one, with `snap`
 METRE = 1000.0  # metre [mm]
-FARTHEST = 1e4  # distance [m], at most, of anything from the base
-LARGE = 20.0  # distance [m] from base to tip that makes one ask
+MAX_METRES = 1e4  # distance [m], at most, of anything from the base
+LARGE_METRES = 20.0  # distance [m] from base to tip that makes one ask
 TURNS = 25.0  # limit [rad] that makes one ask: four turns
 ENDLESS = 1e6  # limit [deg | mm] that is none
 
@@ -125,11 +125,11 @@ def _chain_as_robot(path: str, robot: str, chain: list[Joint], base: str, tip: s
         _check_moving(joint, place)
         direction = T[:3, :3] @ joint_axis(joint, place, snap)
         joints.append(_joint_keys(joint, names[joint.name], T[:3, 3], direction, place, notes))
-        if np.abs(T[:3, 3]).max() > FARTHEST:
+        if np.abs(T[:3, 3]).max() > MAX_METRES:
             raise RobotFileError(f"{place}: stands more than 10 km from {base}; a URDF is in metres")
     reach = float(np.abs(T[:3, 3]).max())
     _check_chain(path, base, tip, len(joints), reach)
-    if reach > LARGE:
+    if reach > LARGE_METRES:
         notes.append(f"{tip} is {reach:.4g} m from {base}: a URDF is in metres, are these millimetres?")
     T[:3, 3] *= METRE
     title = re.sub(r"[^\x20-\x7e]+", " ", robot).strip()[:80] or "arm"
@@ -150,7 +150,7 @@ def _check_chain(path: str, base: str, tip: str, joints: int, reach: float) -> N
         raise RobotFileError(f"{path}: no joint moves between {base} and {tip}; choose another base or tip")
     if joints > 12:
         raise RobotFileError(f"{path}: {joints} joints between {base} and {tip}; a robot file has at most 12")
-    if reach > FARTHEST:
+    if reach > MAX_METRES:
         raise RobotFileError(f"{path}: {tip} is more than 10 km from {base}; a URDF is in metres")
 
 
@@ -238,7 +238,7 @@ def origin_pose(attributes: Mapping[str, str], place: str, snap: bool = False) -
     """The pose that an <origin> says [m]."""
     xyz = parse_triple(attributes.get("xyz"), (0.0, 0.0, 0.0), f"{place}: origin xyz")
     rpy = parse_triple(attributes.get("rpy"), (0.0, 0.0, 0.0), f"{place}: origin rpy")
-    if max(map(abs, xyz)) > FARTHEST:
+    if max(map(abs, xyz)) > MAX_METRES:
         raise RobotFileError(f"{place}: origin xyz is more than 10 km; a URDF is in metres")
     (cr, sr), (cp, sp), (cy, sy) = (_cos_sin(angle, snap) for angle in rpy)
     return np.array(

@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array
 
 MAX_BYTES = 64 * 2**20  # size [bytes], at most, of one file
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-_DEEPEST = 40  # nodes within nodes, at most
+_MAX_DEPTH = 40  # nodes within nodes, at most
 _Index = NDArray[np.int64]
 
 
@@ -84,8 +84,8 @@ def _node_triangles(
     node: Any, T: Array, shapes: dict[Any, list[Array]], nodes: dict[Any, Any], depth: int
 ) -> Iterator[Array]:
     """The triangles of a node and of those within it."""
-    if depth > _DEEPEST:
-        raise ValueError(f"nodes nested deeper than {_DEEPEST}")
+    if depth > _MAX_DEPTH:
+        raise ValueError(f"nodes nested deeper than {_MAX_DEPTH}")
     for element in node:
         T = T @ _transformation(element.tag, [float(x) for x in (element.text or "").split()]) if element.text else T
     for used in node.findall("instance_geometry"):

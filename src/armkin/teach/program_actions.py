@@ -50,7 +50,7 @@ class ProgramActions:
         """Take a path file's text as the program."""
         with self._lock:
             self.program.load(
-                request_checks.text_field(fields, "text", request_checks.LARGEST),
+                request_checks.text_field(fields, "text", request_checks.MAX_BYTES),
                 request_checks.text_field(fields, "name"),
             )
             return self._publish_program()

@@ -20,7 +20,7 @@ from armkin.reachability.reach_map import reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-ACROSS = 12  # voxels from joint 1's axis to the end of the reach
+VOXELS_ACROSS = 12  # voxels from joint 1's axis to the end of the reach
 DIRECTIONS = 12  # directions of the tool's z axis in each voxel
 VALUES = 12  # values of the redundant joint over its range where the others have a closed form; else it stays at home
 
@@ -35,7 +35,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
     """
     real_arm = actual_arm(arm)
     free = redundancy(real_arm, None)
-    step = arm.reach / ACROSS
+    step = arm.reach / VOXELS_ACROSS
     if free is None:  # azimuths 0 and 180 degrees alone: the plane
         reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False)
         grid, shares, values = reach_map.grid, reach_map.columns["share"], 0

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
-MOST = 2000  # moves of a program, at most
+MAX_MOVES = 2000  # moves of a program, at most
 _UNDO = 100  # steps that can be undone
 _DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
 _SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
@@ -124,8 +124,8 @@ class Program:
         document = file.model_dump(exclude_unset=True, exclude_none=True)
         document.pop("robot", None)
         moves = document.pop("moves")
-        if len(moves) > MOST:
-            raise UsageError(f"{name} has {len(moves)} moves; the page takes {MOST}")
+        if len(moves) > MAX_MOVES:
+            raise UsageError(f"{name} has {len(moves)} moves; the page takes {MAX_MOVES}")
         self._undo_states = [*self._undo_states[-_UNDO + 1 :], self._snapshot()]
         self._redo_states = []
         self.head, self.moves, self.via = document, moves, None
@@ -159,8 +159,8 @@ class Program:
 
     def _record(self, fields: Mapping[str, Any]) -> None:
         """Append a move to the pose q, or put it behind `index`."""
-        if len(self.moves) >= MOST:
-            raise UsageError(f"a program has at most {MOST} moves")
+        if len(self.moves) >= MAX_MOVES:
+            raise UsageError(f"a program has at most {MAX_MOVES} moves")
         kind = request_checks.text_field(fields, "kind", 20)
         index = (
             len(self.moves)

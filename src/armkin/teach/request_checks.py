@@ -10,7 +10,7 @@ from typing import Any
 from armkin.errors import UsageError
 from armkin.teach.page_key import RefusedError
 
-LARGEST = 256 * 1024  # size [bytes], at most, of a body: a path file of ten thousand moves
+MAX_BYTES = 256 * 1024  # size [bytes], at most, of a body: a path file of ten thousand moves
 
 
 def body_length(headers: Mapping[str, str]) -> int:
@@ -18,8 +18,8 @@ def body_length(headers: Mapping[str, str]) -> int:
     text = headers.get("Content-Length", "")
     if "Transfer-Encoding" in headers or not (text.isascii() and text.isdigit() and len(text) < 12):
         raise RefusedError(411, "a body needs its Content-Length")
-    if int(text) > LARGEST:
-        raise RefusedError(413, f"a body may have {LARGEST} bytes")
+    if int(text) > MAX_BYTES:
+        raise RefusedError(413, f"a body may have {MAX_BYTES} bytes")
     return int(text)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from armkin.teach.page_key import RefusedError
 
-MOST = 4  # pages at once, at most: a browser keeps six connections to a server, and STOP must find one free
+MAX_TABS = 4  # pages at once, at most: a browser keeps six connections to a server, and STOP must find one free
 _FORGET = 20.0  # time [s] until a page that has never listened is forgotten
 
 
@@ -60,15 +60,15 @@ class Tabs:
             for tab in [t for t in self._tabs.values() if not t.listening and now - t.born > _FORGET]:
                 del self._tabs[tab.id]
             self._check_room()
-            if len(self._tabs) >= 10 * MOST:
+            if len(self._tabs) >= 10 * MAX_TABS:
                 raise RefusedError(429, "too many pages are being opened: try again in a minute")
             tab = Tab()
             self._tabs[tab.id] = tab
             return tab
 
     def _check_room(self) -> None:
-        if sum(tab.listening for tab in self._tabs.values()) >= MOST:
-            raise RefusedError(429, f"the page is open {MOST} times already: close one of them")
+        if sum(tab.listening for tab in self._tabs.values()) >= MAX_TABS:
+            raise RefusedError(429, f"the page is open {MAX_TABS} times already: close one of them")
 
     def find(self, name: str) -> Tab:
         """The page of that id; RefusedError if there is none."""

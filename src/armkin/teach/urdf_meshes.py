@@ -18,11 +18,11 @@ from armkin.teach.mesh_files import read_triangles
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MOST = 18_000  # triangles, at most, of an arm: 0.43 MB of a page
+MAX_TRIANGLES = 18_000  # triangles, at most, of an arm: 0.43 MB of a page
 _FILES = 200  # mesh files, at most, of an arm
 _GRID = 1000  # divisor of the reach that gives the finest grid on which corners stand
-_COARSER = 1.25  # factor from a grid to the next one, until no more triangles are left
-_APART = 0.1, 1e-3  # difference [mm], [rad], at most, between axes of the URDF and of the arm
+_GRID_FACTOR = 1.25  # factor from a grid to the next one, until no more triangles are left
+_AXIS_DIFFERENCE = 0.1, 1e-3  # difference [mm], [rad], at most, between axes of the URDF and of the arm
 
 
 def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
@@ -35,9 +35,9 @@ def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
     unit = arm.reach / _GRID
     while True:
         coarse = [_on_grid(body, unit) for body in bodies]
-        if sum(map(len, coarse)) <= MOST:
+        if sum(map(len, coarse)) <= MAX_TRIANGLES:
             break
-        unit *= _COARSER
+        unit *= _GRID_FACTOR
     if not any(map(len, coarse)):
         raise UsageError(f"{path}: has no meshes of this arm in its <visual> elements")
     if max(int(np.abs(body).max(initial=0)) for body in coarse) > 32_767:
@@ -116,7 +116,7 @@ def _matching_joints(arm: Arm, tree: Tree, first: str, after: list[Array]) -> li
                 if arm.prismatic[k]
                 else float(np.linalg.norm(offset - (offset @ joint_frame[:3, 2]) * joint_frame[:3, 2]))
             )
-            if away > _APART[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _APART[1]:
+            if away > _AXIS_DIFFERENCE[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _AXIS_DIFFERENCE[1]:
                 worst = f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[k]}"
                 break
         else:

@@ -19,7 +19,7 @@ from armkin.model.rotation import rotation_about
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_ALIKE = 0.05  # sine of the angle between two axes below which their common normal says little
+_NEARLY_PARALLEL = 0.05  # sine of the angle between two axes below which their common normal says little
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _normal_feet(link: Array) -> tuple[float, float]:
     """
     z, p = link[:3, 2], link[:3, 3]
     across = 1.0 - z[2] ** 2  # squared sine of the angle between the axes
-    if across < _ALIKE**2:
+    if across < _NEARLY_PARALLEL**2:
         return float(link[2, 3]), 0.0
     # |a e3 - p - b z| is least where both derivatives vanish: a - b z3 = p3, a z3 - b = p z.
     along = float(p @ z)

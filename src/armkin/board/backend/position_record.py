@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 Marks = Mapping[str, Sequence[float] | str]  # what a board keeps, by name, as it says it
-_MOST = 64_000_000  # size [bytes], at most, of a record, and of its plan
+_MAX_BYTES = 64_000_000  # size [bytes], at most, of a record, and of its plan
 _STEP = 1.0 + 1e-9  # distance [counts] from a plan within which every motor on it is; no count lies just there
 
 
@@ -149,7 +149,7 @@ def _pack_plan(plan: NDArray[np.int64]) -> str:
 
 
 def _unpack_plan(text: str, motors: int) -> NDArray[np.int64]:
-    raw = zlib.decompressobj().decompress(base64.b64decode(text), _MOST)
+    raw = zlib.decompressobj().decompress(base64.b64decode(text), _MAX_BYTES)
     rows = np.frombuffer(raw, dtype="<i8").reshape(-1, motors)
     if not len(rows):
         raise ValueError(text)
@@ -158,7 +158,7 @@ def _unpack_plan(text: str, motors: int) -> NDArray[np.int64]:
 
 def _read_record(path: str) -> BoardNote | None:
     """What a record says, if it is one."""
-    record = read_note(path, _MOST)
+    record = read_note(path, _MAX_BYTES)
     if record is None:
         return None
     try:

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
 
 PERIOD = 0.02  # time [s] between two positions sent
-LATE = 0.05  # time [s] that one position goes on at most: a program that was late does not cut across its path
+MAX_OVERRUN = 0.05  # time [s] that one position goes on at most: a program that was late does not cut across its path
 WATCH = 0.1  # time [s] between readings of position and errors in motion
 LAG = 400  # distance [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
 SETTLED = 12  # distance [counts] from the goal, 1 degree, at which a move has arrived
@@ -212,7 +212,7 @@ class ServoArm(Backend):
                 self.port.read(PERIOD - (present - last))
                 continue
             stopping = stopping or self._stop()
-            passed, last = min(present - last, LATE), present
+            passed, last = min(present - last, MAX_OVERRUN), present
             if stopping:
                 pace = max(0.0, pace - passed / ramp)
             t = min(trajectory.duration, t + passed * pace)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["LAG", "SETTLED", "ServoMachine", "job", "servo_ids"]
 
 _ENDLESS = 1 << 30  # position [counts] that bounds a servo without limits
-EAGER = 1.5  # factor on the trajectory's speed that a servo may move at to keep up
+CATCH_UP_FACTOR = 1.5  # factor on the trajectory's speed that a servo may move at to keep up
 
 
 class ServoMachine(ServoArm):
@@ -55,7 +55,10 @@ class ServoMachine(ServoArm):
         """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
         limit_bytes = self.bus.read_all(self.ids, *registers.LIMITS)
         pairs = [
-            [self._limit_value(registers.LEAST, limit_bytes[n]), self._limit_value(registers.MOST, limit_bytes[n])]
+            [
+                self._limit_value(registers.MIN_POSITION, limit_bytes[n]),
+                self._limit_value(registers.MAX_POSITION, limit_bytes[n]),
+            ]
             for n in self.ids
         ]
         return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
@@ -68,7 +71,7 @@ class ServoMachine(ServoArm):
         """Goal positions for all servos at one moment, with the speed that reaches them; 0: as fast as it can."""
         rows = {}
         for number, count, rate in zip(self.ids, counts.tolist(), rates.tolist(), strict=True):
-            speed = 0 if rate == 0.0 else min(int(EAGER * rate) + 20, 32767)
+            speed = 0 if rate == 0.0 else min(int(CATCH_UP_FACTOR * rate) + 20, 32767)
             rows[number] = b"".join(
                 (
                     registers.ACCELERATION.pack(0),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_LONGEST = 1_000_000  # size [bytes], at most, of a calibration file
+_MAX_BYTES = 1_000_000  # size [bytes], at most, of a calibration file
 _MIDDLE = 5.0  # distance [deg], at most, of a joint's zero from the middle of its limits
 _WHOLE = {
     "id": (0, 253),
@@ -78,8 +78,8 @@ def read_calibration(path: str) -> dict[int, Motor]:
     """The motors of a calibration file, by their ids. Raises FileError, naming the motor, for what is none."""
     try:
         with open(path, encoding="utf-8") as file:
-            text = file.read(_LONGEST + 1)
-        entries = json.loads(text) if len(text) <= _LONGEST else None
+            text = file.read(_MAX_BYTES + 1)
+        entries = json.loads(text) if len(text) <= _MAX_BYTES else None
     except OSError as error:
         raise FileError(f"{path}: {error.strerror or error}", file=path) from None
     except (ValueError, RecursionError):

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple
 
-ALL = 0xFE  # id of a broadcast, which no servo answers but with a sync read
-LARGEST = 250  # size [bytes] of the longest packet that a servo takes
+BROADCAST = 0xFE  # id of a broadcast, which no servo answers but with a sync read
+MAX_BYTES = 250  # size [bytes] of the longest packet that a servo takes
 
 
 class Instruction(IntEnum):
@@ -41,8 +41,8 @@ def packet(servo: int, kind: int, parameters: bytes = b"") -> bytes:
     'ff ff 01 02 01 fb'
     """
     body = bytes([servo, len(parameters) + 2, kind]) + parameters
-    if len(body) + 3 > LARGEST:
-        raise ValueError(f"a packet of {len(body) + 3} bytes; servos take {LARGEST}")
+    if len(body) + 3 > MAX_BYTES:
+        raise ValueError(f"a packet of {len(body) + 3} bytes; servos take {MAX_BYTES}")
     return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
 
 
@@ -58,14 +58,14 @@ def write_registers(servo: int, address: int, values: bytes) -> bytes:
 
 def sync_read(servos: Sequence[int], address: int, size: int) -> bytes:
     """Ask several servos for the same registers; they answer one after another, in this order."""
-    return packet(ALL, Instruction.SYNC_READ, bytes([address, size, *servos]))
+    return packet(BROADCAST, Instruction.SYNC_READ, bytes([address, size, *servos]))
 
 
 def sync_write(address: int, values_of: Mapping[int, bytes]) -> bytes:
     """Write the same registers of several servos at one moment; nobody acknowledges it."""
     size = len(next(iter(values_of.values())))
     rows = b"".join(bytes([servo]) + values for servo, values in values_of.items())
-    return packet(ALL, Instruction.SYNC_WRITE, bytes([address, size]) + rows)
+    return packet(BROADCAST, Instruction.SYNC_WRITE, bytes([address, size]) + rows)
 
 
 class Splitter:
@@ -82,7 +82,7 @@ class Splitter:
             if len(self._bytes) < 4:
                 return
             servo, length = self._bytes[2], self._bytes[3]
-            if servo == 0xFF or not 2 <= length <= LARGEST - 4:
+            if servo == 0xFF or not 2 <= length <= MAX_BYTES - 4:
                 del self._bytes[:1]  # not the beginning of a packet
                 continue
             if len(self._bytes) < length + 4:

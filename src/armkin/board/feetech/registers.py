@@ -33,8 +33,8 @@ class Register(NamedTuple):
 
 
 MODEL = Register(3, 2)
-LEAST = Register(9, 2)  # least position [counts] that the servo goes to; least and most both 0: it turns without limits
-MOST = Register(11, 2)  # greatest position [counts] that the servo goes to
+MIN_POSITION = Register(9, 2)  # least position [counts] that the servo goes to; both 0: it turns without limits
+MAX_POSITION = Register(11, 2)  # greatest position [counts] that the servo goes to
 OFFSET = Register(31, 2, 11)  # counts taken off the encoder's position
 TORQUE = Register(40, 1)
 ACCELERATION = Register(41, 1)  # acceleration [100 counts/s^2], 0: none
@@ -48,7 +48,7 @@ VOLTAGE = Register(62, 1)  # supply [0.1 V]
 TEMPERATURE = Register(63, 1)  # temperature [deg C]
 MOVING = Register(66, 1)
 
-LIMITS = (LEAST.address, 4)  # registers of the least and the greatest position: read together
+LIMITS = (MIN_POSITION.address, 4)  # registers of the least and the greatest position: read together
 GOAL = (ACCELERATION.address, 7)  # registers of acceleration, position, time and speed: written together
 STATE = (POSITION.address, 8)  # registers of position, speed, load, voltage and temperature: read together
 

@@ -14,9 +14,9 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Gripper
 
 SPEED = 500.0  # speed [counts/s] of a gripper without max_speed, 44 deg/s
-ARRIVED = 12  # distance [counts] from the goal, 1 degree, at which the jaw is at its goal
+ARRIVAL_COUNTS = 12  # distance [counts] from the goal, 1 degree, at which the jaw is at its goal
 STANDING = 1.0  # time [s] without a change of position after which the jaw holds something
-THERE = 0.1  # time [s] without a change of position after which a jaw at its goal has arrived
+ARRIVAL_S = 0.1  # time [s] without a change of position after which a jaw at its goal has arrived
 PERIOD = 0.02  # time [s] between readings
 
 
@@ -35,7 +35,7 @@ def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bo
     bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))
     bus.write(number, registers.GOAL_POSITION, goal)
     since = port.now()
-    while position != goal and port.now() - since < (THERE if abs(position - goal) <= ARRIVED else STANDING):
+    while position != goal and port.now() - since < (ARRIVAL_S if abs(position - goal) <= ARRIVAL_COUNTS else STANDING):
         port.read(PERIOD)
         if stop():
             bus.write(number, registers.GOAL_POSITION, bus.read(number, registers.POSITION))

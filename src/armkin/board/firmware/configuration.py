@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import Gripper
 
-_FAR = 2**30  # limit [counts] of an axis without one
+_NO_LIMIT = 2**30  # limit [counts] of an axis without one
 _SLACK = 1.05  # factor on a motor's rate: cycles, rates of 15 bits and parabolas make a ramp's end that much faster
 _SERVO_RANGE = (400, 2600)  # pulse lengths [us] that the boards can make
 
@@ -140,9 +140,9 @@ def _count_limits(arm: Arm) -> tuple[list[int], list[int]]:
             corner = np.where(gain * sign >= 0, arm.upper, arm.lower)
             corner = np.where(gain == 0, arm.home, corner)
             if np.all(np.isfinite(corner)):
-                ends[side].append(max(-_FAR, min(_FAR, int(pulses(arm, corner)[k]))))
+                ends[side].append(max(-_NO_LIMIT, min(_NO_LIMIT, int(pulses(arm, corner)[k]))))
             else:
-                ends[side].append(sign * _FAR)
+                ends[side].append(sign * _NO_LIMIT)
     servo = pulse_range(arm)
     low = [max(a, int(s)) if s > -math.inf else a for a, s in zip(ends[0], servo[:, 0], strict=True)]
     high = [min(a, int(s)) if s < math.inf else a for a, s in zip(ends[1], servo[:, 1], strict=True)]
@@ -178,9 +178,9 @@ def _limit_row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, 
     offset = float(weight @ arm.motor_bias)
     bounds = []
     for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):
-        value = (limit - arm.home[j]) * scale + offset + sign * slack if math.isfinite(limit) else sign * _FAR
+        value = (limit - arm.home[j]) * scale + offset + sign * slack if math.isfinite(limit) else sign * _NO_LIMIT
         rounded = math.floor(value) if sign < 0 else math.ceil(value)
-        bounds.append(max(-_FAR, min(_FAR, rounded)))
+        bounds.append(max(-_NO_LIMIT, min(_NO_LIMIT, rounded)))
     weights = [0] * len(board.axes)
     for axis, w in zip(axes, weight, strict=True):
         weights[axis] = int(w)

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from armkin.board.firmware.wire.protocol import Status
     from armkin.model.arm import Arm
 
-_SLOW = 26  # speed of the second approach, in 1/256 of the first: a tenth
-_MOST = 2**30  # greatest number of counts and of counts/s in a command
+_SLOW_SPEED = 26  # speed of the second approach, in 1/256 of the first: a tenth
+_MAX_COUNTS = 2**30  # greatest number of counts and of counts/s in a command
 _MARGIN = 1.25  # distance of a switch, at most, in a joint's ranges
 
 
@@ -51,7 +51,7 @@ class Search:
             tag,
             switch=self.switch,
             closed=self.closed,
-            slow=_SLOW,
+            slow=_SLOW_SPEED,
             backoff=self.backoff,
             travel=self.travel,
             time=self.time,
@@ -225,20 +225,20 @@ def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
         rate[axis] = int(np.rint(value))
     leader = float(np.abs(gain).max())
     fastest, slowest = max(map(abs, rate)), min((abs(r) for r in rate if r), default=0)
-    if fastest > _MOST or slowest < 1:
+    if fastest > _MAX_COUNTS or slowest < 1:
         raise UsageError(
-            f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to {_MOST} can be"
+            f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to {_MAX_COUNTS} can be"
         )
     backoff = math.ceil(leader * homing.backoff * unit)
-    if backoff > _MOST:
-        raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; {_MOST} can be")
+    if backoff > _MAX_COUNTS:
+        raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; {_MAX_COUNTS} can be")
     span = float(arm.upper[j] - arm.lower[j])
     if not math.isfinite(span):
         if arm.prismatic[j]:
             raise UsageError(f"joint {name} has no limits: homing would not know how far to look")
         span = 2 * math.pi
     travel = math.ceil(leader * (_MARGIN * span + homing.backoff * unit))
-    seconds = 2 * _MARGIN * span / speed + 4 * backoff / (leader * speed * _SLOW / 256) + 5
+    seconds = 2 * _MARGIN * span / speed + 4 * backoff / (leader * speed * _SLOW_SPEED / 256) + 5
     return Search(
         joint=j,
         switch=board.switches.index(homing.switch),

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
 HANDLE = 0.25  # time [s] that a board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
-_LONGEST = 60.0  # length [s], at most, of a jog that is looked at
-SLOW = 8  # divisor of max_speed for a lost position: at most an eighth
+_MAX_SECONDS = 60.0  # length [s], at most, of a jog that is looked at
+SLOW_DIVISOR = 8  # divisor of max_speed for a lost position: at most an eighth
 
 
 def prepare_jog(machine: FirmwareMachine) -> None:
@@ -74,7 +74,7 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     ]  # [rad/s | mm/s]
     rate = float(joint_rates[joint])
     room = max(float((arm.lower, arm.upper)[rate > 0][joint] - q[joint]) / rate, 0.0)
-    goal = q + min(room, _LONGEST) * joint_rates
+    goal = q + min(room, _MAX_SECONDS) * joint_rates
     free, why = free_way(arm, q, goal)
     if why is None:
         return math.inf

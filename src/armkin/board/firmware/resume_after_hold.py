@@ -24,9 +24,9 @@ from armkin.errors import HeldError, LinkError, NothingHeldError
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-_SURE = 1.0  # error [s], at most, of the noted time: of places that near, the earliest is taken
-_NOTED = 0.5  # time [s] between two notes while the arm moves
-_MOST = 65_536  # size [bytes], at most, of a note
+_TIME_ERROR = 1.0  # error [s], at most, of the noted time: of places that near, the earliest is taken
+_NOTE_PERIOD = 0.5  # time [s] between two notes while the arm moves
+_MAX_BYTES = 65_536  # size [bytes], at most, of a note
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class Trip:
     def progress(self, seconds: float) -> None:
         """Note that so many seconds of what is left are done."""
         elapsed = self._seconds_before + seconds
-        if elapsed - self._note.seconds >= _NOTED:
+        if elapsed - self._note.seconds >= _NOTE_PERIOD:
             self._note = replace(self._note, seconds=elapsed)
             if self._keeps_note:
                 write_note(self._file, asdict(self._note))
@@ -141,7 +141,7 @@ def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Pl
             advice="plan a new motion: it starts where the arm stands",
         )
     nearest = min(abs(place.elapsed - note.seconds) for place in places)
-    return next(place for place in places if abs(place.elapsed - note.seconds) <= nearest + _SURE)
+    return next(place for place in places if abs(place.elapsed - note.seconds) <= nearest + _TIME_ERROR)
 
 
 def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place) -> list[Cut]:
@@ -153,7 +153,7 @@ def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place
 
 def _read_held_note(path: str) -> Note | None:
     """The note, if there is one that this user wrote."""
-    fields = read_note(path, _MOST)
+    fields = read_note(path, _MAX_BYTES)
     if fields is None:
         return None
     try:

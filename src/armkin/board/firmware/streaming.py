@@ -26,16 +26,16 @@ _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor and lead [s]: a
 _TICK = 20_000  # length [cycles], at most, of a tick of that pause
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # share and time [s]: a queue is dry below 1 / 32 and 2 ms more than the time to a stop
-_SLOW = 0.024  # time to a stop [s] from which on a queue can be dry
-_TWICE = 1 + 33 / 32  # motion [s] that each second since rest wants in the queue
+_SLOW_STOP = 0.024  # time to a stop [s] from which on a queue can be dry
+_QUEUE_RATE = 1 + 33 / 32  # motion [s] that each second since rest wants in the queue
 _UNHEARD_MOST = 0.045  # length [s] of a segment before the first step, at most, in which the arm may wait for its queue
 _INTERVAL = 50_000  # interval [cycles] of a tick, at most
 _SEEN = 64  # segments of a beginning whose way to the board is reckoned: both ramps of a short move
 # Segments of a motion's first frames: a short one is there soon, those behind it last a while.
 _STARTING = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
-_FAR = 0.005  # time [s] of the slowest answer from which on the queue is too short to wait for credit in a short move
+_FAR_ANSWER = 0.005  # time [s] of the slowest answer from which on a short move cannot wait for credit
 _BUSY = 0.0003, 0.0005  # time [s] that a board is busy with a frame, and with a segment of it
-_BETWEEN = 2.2  # factor on these times between ticks
+_TICK_FACTOR = 2.2  # factor on these times between ticks
 _ACK = 16  # size [bytes] of an answer
 
 
@@ -95,7 +95,7 @@ def ramp_pieces(session: Session) -> Pieces:
     """How finely ramps are cut."""
     if session.line.noisy:
         return Pieces.ROUGH
-    return Pieces.FEW if _processor_load(session) > 1 or session.line.slowest > _FAR else Pieces.FINE
+    return Pieces.FEW if _processor_load(session) > 1 or session.line.slowest > _FAR_ANSWER else Pieces.FINE
 
 
 def _processor_load(session: Session) -> float:
@@ -139,7 +139,7 @@ def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], un
         free = max(free, may) + size * bit
         begins = max(free, queued[-1] if queued else 0.0)
         ends = begins + _BUSY[0] + segments * _BUSY[1]
-        queued.append(ends + (_BETWEEN - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
+        queued.append(ends + (_TICK_FACTOR - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
         moves = moves or ends + _LEAD + unheard
     return queued
 
@@ -154,8 +154,8 @@ def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unhear
     behind = elapsed = 0.0  # done: [s] of motion in all before a frame
     for k, (seconds, _, _) in enumerate(frames):
         if k:
-            stops = (elapsed - _SPARE - ahead * (_TWICE - 1)) / _TWICE
-            behind = max(behind, queued[k] - queued[0] - min(elapsed, max(_SLOW - ahead, stops)))
+            stops = (elapsed - _SPARE - ahead * (_QUEUE_RATE - 1)) / _QUEUE_RATE
+            behind = max(behind, queued[k] - queued[0] - min(elapsed, max(_SLOW_STOP - ahead, stops)))
         elapsed += seconds
     return behind
 

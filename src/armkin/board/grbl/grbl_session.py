@@ -26,13 +26,13 @@ _ANSWER = 2.0  # time [s] that a line may take that moves nothing
 _POLL = 0.1  # time [s] between status requests in motion
 _SILENCE = 2.0  # time [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
 _HELD = 15.0  # time [s] without an answer while GRBL holds: its button was pressed, or a byte was damaged into a hold
-_LATE = 0.05  # time [s] that answers to another program's lines may come behind
+_LATE_ANSWERS = 0.05  # time [s] that answers to another program's lines may come behind
 _NONSENSE = ")&"  # characters that are no line, whatever they are the end of
 _KEPT = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
 _READINGS = 13  # readings, at most, of an answer until three in a row agree
 _UNCLEAR = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
 _REPORT = 0.5  # time [s] that a status report may take
-_LONGEST = 4096  # characters, at most, without a line end: no GRBL speaks there
+_MAX_LINE = 4096  # characters, at most, without a line end: no GRBL speaks there
 
 
 T = TypeVar("T")
@@ -116,7 +116,7 @@ class Session:
             if not error.error:
                 raise
             with suppress(GrblError):  # the first error may have been that of another program's line
-                self._wait(lambda: False, _LATE)
+                self._wait(lambda: False, _LATE_ANSWERS)
             return
         if not obeyed:
             raise LinkError(f"GRBL on {self.port.name} takes no lines: does it dwell for another program?")
@@ -245,8 +245,8 @@ class Session:
     def _pump(self, timeout: float) -> None:
         self._text += self.port.read(timeout).decode("ascii", "replace")
         *lines, self._text = self._text.split("\n")
-        if len(self._text) > _LONGEST:
-            raise LinkError(f"{self.port.name} does not answer as GRBL does: {_LONGEST} characters without a line end")
+        if len(self._text) > _MAX_LINE:
+            raise LinkError(f"{self.port.name} does not answer as GRBL does: {_MAX_LINE} characters without a line end")
         for line in lines:
             self._hear(line.strip("\r "))
 

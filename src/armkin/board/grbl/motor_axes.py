@@ -8,7 +8,7 @@ import numpy as np
 
 from armkin.board.backend.stepper_arm import steppers
 from armkin.board.grbl.replies import LETTERS
-from armkin.board.grbl.settings import COARSE, Axis
+from armkin.board.grbl.settings import COARSE_STEPS, Axis
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -23,10 +23,10 @@ def axes_of(arm: Arm) -> list[Axis]:
     """
     axes: list[Axis] = []
     for k, motor, name, steps, speed, accel in steppers(arm, "GRBL", LETTERS):
-        if steps > COARSE:
+        if steps > COARSE_STEPS:
             raise UsageError(
                 f"{arm.path or arm.name}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with "
-                f"three decimals, enough for {COARSE:g} steps a unit at most"
+                f"three decimals, enough for {COARSE_STEPS:g} steps a unit at most"
             )
         axes.append(Axis(motor.axis, name, steps, motor.invert, speed, accel, _is_upward(arm, k)))
     return axes

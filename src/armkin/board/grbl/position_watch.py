@@ -23,8 +23,8 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.formula.arrays import Array
 
-BESIDE = 2.0  # distance [steps] of a motor from the path: GRBL's own rounding, and that of its reports, is below 1
-AHEAD = 0.3  # time [s] ahead of the plan, at most: GRBL is never faster than it was told
+PATH_DISTANCE = 2.0  # distance [steps] of a motor from the path: GRBL's own rounding and its reports' is below 1
+LEAD_TIME = 0.3  # time [s] ahead of the plan, at most: GRBL is never faster than it was told
 CREEP = 0.1, 3.0  # part [s] of the plan, and time [s] that GRBL takes for it when it no longer moves
 _WINDOW = 250  # points of the path that are looked at, 10 s
 
@@ -59,7 +59,7 @@ class Watch:
         steps = np.array([report.position[axis.index] * axis.steps for axis in self._axes])
         plan_times = self._plan_times(steps - self._offset)
         wrong = "it has left its path" if plan_times is None else None
-        if plan_times is not None and plan_times[0] > elapsed + AHEAD:
+        if plan_times is not None and plan_times[0] > elapsed + LEAD_TIME:
             wrong = "it is faster than planned"
         self._doubts = self._doubts + 1 if wrong else 0
         if self._doubts >= 2:  # a report has no checksum either
@@ -79,11 +79,11 @@ class Watch:
         begin = max(self._points_passed - 1, 0)
         points = self._points[begin : begin + _WINDOW + 1]
         if len(points) == 1:
-            return (0.0, 0.0) if np.abs(counts - points[0]).max() <= BESIDE else None
+            return (0.0, 0.0) if np.abs(counts - points[0]).max() <= PATH_DISTANCE else None
         way = np.diff(points, axis=0)
         share = ((counts - points[:-1]) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-12)
         share = np.clip(share, 0.0, 1.0)
-        near = np.abs(counts - points[:-1] - share[:, None] * way).max(axis=1) <= BESIDE
+        near = np.abs(counts - points[:-1] - share[:, None] * way).max(axis=1) <= PATH_DISTANCE
         if not near.any():
             return None
         first = int(near.argmax())

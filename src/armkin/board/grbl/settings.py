@@ -11,7 +11,7 @@ from armkin.board.grbl.replies import LETTERS
 _WHOLE = (1, 3, 10, 13, 20, 22, 23, 32, 384)  # settings of whole numbers
 HOMING = (22, 23)  # settings that only homing needs
 G92_VOLATILE = 384  # setting of grblHAL: 1 clears G92 when the board loses its power
-COARSE = 500.0  # resolution [steps a unit] beyond which GRBL's three decimals do not tell every step
+COARSE_STEPS = 500.0  # resolution [steps a unit] beyond which GRBL's three decimals do not tell every step
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 PIECE = 0.04  # length [s] of a curved stretch in one line: 25 lines a second
 HEAD = "G21G94"  # words in every line: another program may have left, or set between two, inches or inverse time
-SLOWEST = 0.01  # feed [units/min], at least: GRBL refuses 0
+MIN_FEED = 0.01  # feed [units/min], at least: GRBL refuses 0
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
@@ -43,7 +43,7 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
                     for axis, value, moves in zip(axes, (goal + offset) / steps, goal != position, strict=True)
                     if moves
                 )
-                yield f"{HEAD}G53G1{words}F{max(60 * speed, SLOWEST):.3f}"
+                yield f"{HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
             else:
                 idle += t - before
             position, before = goal, t

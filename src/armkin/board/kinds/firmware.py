@@ -146,7 +146,7 @@ class FirmwareBoard(Board):
     def ready_to_jog(self, joint: int, rate: float) -> float:
         """Have the motors on; while the position is lost a joint moves at an eighth of its max_speed at most."""
         jogging.prepare_jog(self.machine)
-        top = float(self.arm.max_speed[joint]) / jogging.SLOW
+        top = float(self.arm.max_speed[joint]) / jogging.SLOW_DIVISOR
         allowed = float(np.clip(rate, -top, top)) if self.machine.position() == "lost" else rate
         jogging.count_rates(self.machine, joint, self._in_shown_units(joint, allowed))
         return allowed

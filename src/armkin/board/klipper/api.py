@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 END = b"\x03"  # byte that ends a message
 _ANSWER = 5.0  # time [s] that a question may take
-_LONGEST = 4_000_000  # size [bytes], at most, of one answer
+_MAX_BYTES = 4_000_000  # size [bytes], at most, of one answer
 
 
 class KlipperError(LinkError):
@@ -68,7 +68,7 @@ class Api:
         """Read what has come, or comes in so many seconds."""
         self._text += self._port.read(timeout)
         *messages, self._text = self._text.split(END)
-        if len(self._text) > _LONGEST:
+        if len(self._text) > _MAX_BYTES:
             raise LinkError(f"{self._port.name} does not answer as Klipper's API server does")
         for part in messages:
             try:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 _CHUNK = 10  # lines in one request
 _PENDING = 8  # requests, at most, that wait: Klipper answers when it has taken them
 _SPARE = 0.75  # motion [s] sent ahead of what braking takes: Klipper drains its queue when it holds less than 0.25 s
-_FARTHEST = 1e9  # coordinate [units], at most, of a place that can be
+_MAX_COORDINATE = 1e9  # coordinate [units], at most, of a place that can be
 _REST = 30.0  # time [s] until what was sent must be done
 
 
@@ -212,7 +212,7 @@ def _axis_places(position: object, places: dict[str, Any], axes: Sequence[Axis])
         if not isinstance(position, list) or not isinstance(k, int) or not 0 <= k < len(position):
             return None
         value = position[k]
-        if not isinstance(value, int | float) or not abs(value) < _FARTHEST:
+        if not isinstance(value, int | float) or not abs(value) < _MAX_COORDINATE:
             return None
         values.append(float(value))
     return values

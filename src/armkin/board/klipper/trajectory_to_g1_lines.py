@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 HEAD = "G90\nM220 S100\nG92 X0"  # words before a motion: absolute values, no override of the speed, the time begins
 _ROWS = 256  # lines worked out at once
-_SHORT = 1e-4  # length [s] below which a piece joins the next one: X has five decimals
+_SHORT_PIECE = 1e-4  # length [s] below which a piece joins the next one: X has five decimals
 
 
 def line_count(trajectory: Trajectory) -> int:
@@ -92,4 +92,4 @@ def _piece_times(trajectory: Trajectory) -> Array:
         count = max(int(np.ceil(stretch.duration / PIECE)), 1)
         ends.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
     times = np.concatenate(ends)
-    return np.asarray(times[np.append(np.diff(times) > _SHORT, np.ones(len(times[:1]), dtype=bool))])
+    return np.asarray(times[np.append(np.diff(times) > _SHORT_PIECE, np.ones(len(times[:1]), dtype=bool))])

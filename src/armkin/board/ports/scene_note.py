@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from armkin.board.ports.port_lock import note_path
 
-_LONGEST = 4096  # length [bytes], at most, of a file's name
+_MAX_BYTES = 4096  # length [bytes], at most, of a file's name
 
 
 def write_scene(port: str, scene: str) -> None:
@@ -23,7 +23,7 @@ def last_scene(port: str) -> str:
     """The file that was noted last; empty if there is none."""
     try:
         with open(_scene_note_path(port), encoding="utf-8") as file:
-            return file.read(_LONGEST)
+            return file.read(_MAX_BYTES)
     except (OSError, ValueError):
         return ""
 

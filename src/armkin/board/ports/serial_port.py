@@ -22,7 +22,7 @@ from armkin.board.ports.port_lock import Lock
 from armkin.errors import LinkError
 
 _READ = 0.005  # time [s] that a read waits at most
-_MOST = 4096  # size [bytes] of one read: what never falls silent must not keep it from the clock and from a stop
+_MAX_READ = 4096  # size [bytes] of one read: what never falls silent must not keep it from the clock and from a stop
 
 
 class SerialPort:
@@ -58,8 +58,8 @@ class SerialPort:
 
     def _read_some(self) -> bytes:
         received: bytes = self._serial.read(1)
-        while 0 < len(received) < _MOST and (waiting := self._serial.in_waiting):
-            more: bytes = self._serial.read(min(waiting, _MOST))
+        while 0 < len(received) < _MAX_READ and (waiting := self._serial.in_waiting):
+            more: bytes = self._serial.read(min(waiting, _MAX_READ))
             if not more:
                 break
             received += more

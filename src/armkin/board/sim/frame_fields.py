@@ -56,7 +56,7 @@ def axes_of(mask: int) -> list[int]:
     return [i for i in range(16) if mask >> i & 1]
 
 
-_FAR = 2**30  # number [counts], at most, in a field
+_MAX_COUNTS = 2**30  # number [counts], at most, in a field
 
 
 def image_valid(image: Image, board: Board) -> bool:
@@ -82,13 +82,13 @@ def _row_valid(row: RowImage, axes: Sequence[AxisImage]) -> bool:
     """Whether a coupled limit has its bounds in order, and its sum fits the board's numbers."""
     reach = zip(row.weight, axes, strict=True)
     most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
-    return row.lower <= row.upper and most < _FAR
+    return row.lower <= row.upper and most < _MAX_COUNTS
 
 
 def _axis_valid(axis: AxisImage, *, servo: int) -> bool:
     """Whether an axis that is used has limits around its home, rates that it can keep, and a servo's pulses."""
     return not axis.used or (
-        -_FAR <= axis.lower <= axis.home <= axis.upper <= _FAR
+        -_MAX_COUNTS <= axis.lower <= axis.home <= axis.upper <= _MAX_COUNTS
         and axis.max_rate > 0
         and 0 < axis.max_accel < 2**24
         and (not servo or 400 <= axis.lower <= axis.upper <= 2600)

@@ -15,7 +15,7 @@ from armkin.board.grbl.replies import LETTERS
 SYSTEMS = "G54", "G55", "G56", "G57", "G58", "G59"
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
 _MOTION = {0.0, 1.0, 80.0}
-_OTHER = {4.0, 10.0, 28.0, 53.0, 92.0, 92.1}
+_OTHER_CODES = {4.0, 10.0, 28.0, 53.0, 92.0, 92.1}
 _GROUPS = (  # modal groups: one word of each in a line
     _MOTION,
     {17.0, 18.0, 19.0},
@@ -29,7 +29,7 @@ _GROUPS = (  # modal groups: one word of each in a line
 )
 _OFFSETS = frozenset({10.0, 43.1, 92.0, 92.1})
 _USES_AXES = {10.0, 28.0, 43.1, 92.0}  # codes whose axis words are no move
-_KNOWN = set().union(_OTHER, *_GROUPS)
+_KNOWN = set().union(_OTHER_CODES, *_GROUPS)
 INCH = 25.4  # inch [mm]
 
 

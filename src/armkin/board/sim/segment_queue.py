@@ -12,7 +12,7 @@ from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
 from armkin.board.sim.axis_counts import Axes
 
 _TOO_FAST = 0.030  # time [s] to a stop from which an abrupt stop loses steps
-_SLOW = 0.024  # time [s] to a stop below which the arm may stand where its queue ends
+_SLOW_STOP = 0.024  # time [s] to a stop below which the arm may stand where its queue ends
 
 
 def intervals(s: Segment) -> Iterator[int]:
@@ -132,7 +132,7 @@ class Queue:
 
     def dry(self, u: float, *, holding: bool = False) -> bool:
         """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
-        if not self._queue or self._queue[-1].end or (u < _SLOW and not holding):
+        if not self._queue or self._queue[-1].end or (u < _SLOW_STOP and not holding):
             return False
         cycles_left = self._units * 256 - self._cycles_run
         return cycles_left / self.clock < u + u / 32 + 0.002

@@ -6,15 +6,15 @@ import random
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from armkin.board.feetech.packet import ALL, Instruction, Splitter, packet
+from armkin.board.feetech.packet import BROADCAST, Instruction, Splitter, packet
 from armkin.board.feetech.registers import (
     COUNTS,
     GOAL_POSITION,
     GOAL_SPEED,
-    LEAST,
     LOAD,
+    MAX_POSITION,
+    MIN_POSITION,
     MODEL,
-    MOST,
     MOVING,
     POSITION,
     SPEED,
@@ -26,7 +26,7 @@ from armkin.board.feetech.registers import (
 from armkin.board.sim.clock import SimulatedTime
 
 PAUSE = 0.002  # time [s], at most, between the bytes of a packet
-FASTEST = 3400  # speed [counts/s], at most, of a servo
+MAX_SPEED = 3400  # speed [counts/s], at most, of a servo
 
 
 class Servo:
@@ -38,8 +38,8 @@ class Servo:
         self.errors = 0
         self.memory = bytearray(80)
         self.set(MODEL, 777)
-        self.set(LEAST, 0)
-        self.set(MOST, COUNTS - 1)
+        self.set(MIN_POSITION, 0)
+        self.set(MAX_POSITION, COUNTS - 1)
         self.set(VOLTAGE, 74)
         self.set(TEMPERATURE, 31)
         self.set(GOAL_POSITION, round(position))
@@ -60,8 +60,8 @@ class Servo:
             return  # it stands, and its registers say so
         before = self.position
         if moves and seconds > 0:
-            fastest = (abs(self.get(GOAL_SPEED)) or FASTEST) * seconds
-            goal, low, high = (self.get(register) for register in (GOAL_POSITION, LEAST, MOST))
+            fastest = (abs(self.get(GOAL_SPEED)) or MAX_SPEED) * seconds
+            goal, low, high = (self.get(register) for register in (GOAL_POSITION, MIN_POSITION, MAX_POSITION))
             goal = min(max(goal, low), high) if low or high else goal  # it goes no farther than its own limits
             self.position += max(-fastest, min(fastest, goal - self.position))
         self.speed = (self.position - before) / seconds if seconds > 0 else 0.0
@@ -119,7 +119,7 @@ class ServoBus(SimulatedTime):
             self.log.append((self._now, {number: servo.position for number, servo in self.servos.items()}))
 
     def _obey_instruction(self, number: int, kind: int, parameters: bytes) -> None:
-        if number == ALL:
+        if number == BROADCAST:
             self._obey_all(kind, parameters)
         elif number in self.servos:
             servo = self.servos[number]

@@ -15,7 +15,7 @@ from armkin.cli.options import Json, Robot, Scene
 from armkin.errors import UsageError
 from armkin.model import units
 
-_LONGEST = 60.0  # length [s], at most, of a jog
+_MAX_SECONDS = 60.0  # length [s], at most, of a jog
 
 
 def jog(
@@ -44,8 +44,8 @@ def jog(
     j = joint_index(arm, joint)
     rate = number(speed, "SPEED")
     time = number(seconds, "--seconds")
-    if not 0 < time <= _LONGEST:
-        raise UsageError(f"--seconds: '{seconds}' must be above 0 and at most {_LONGEST:g}")
+    if not 0 < time <= _MAX_SECONDS:
+        raise UsageError(f"--seconds: '{seconds}' must be above 0 and at most {_MAX_SECONDS:g}")
     top = float(units.joints_out(arm, arm.max_speed)[j])
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")

@@ -256,7 +256,7 @@ def _moves_of(arm: Arm, file: str | None, via: list[str] | None, task: str | Non
         return path_file.validate_path({"moves": [{"point": first}, *({"line": corner} for corner in later_corners)]})
     assert file is not None
     if file == "-":
-        return path_file.parse_path_file(arguments.standard_input(path_file.LARGEST), "standard input")
+        return path_file.parse_path_file(arguments.standard_input(path_file.MAX_BYTES), "standard input")
     files.protect_input(file)
     return path_file.read_path_file(file)
 

@@ -173,13 +173,13 @@ def _poses_of_file(arm: Arm, path: str) -> Any:
     """The rows of a file (K, n) [deg | mm]."""
     import numpy as np
 
-    from armkin.plot.pose_picture import MOST
+    from armkin.plot.pose_picture import MAX_POSES
 
     parts: list[Any] = []
     for chunk in batch_rows(path, arm.joint_names, arm.name, units.poses_out(arm)):
         parts.append(chunk.values)
-        if sum(map(len, parts)) > MOST:
-            raise UsageError(f"{path}: more than {MOST} poses are too many for one picture")
+        if sum(map(len, parts)) > MAX_POSES:
+            raise UsageError(f"{path}: more than {MAX_POSES} poses are too many for one picture")
     if not parts:
         raise UsageError(f"{path}: no poses; give one row of {','.join(arm.joint_names)} for each")
     return np.concatenate(parts)

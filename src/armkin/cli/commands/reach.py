@@ -40,11 +40,14 @@ def reach(
     Cells are sectors of rings about joint 1's axis, so that one solve answers whole arcs of azimuths and rolls,
     exactly. Columns of --out: centre, share of orientations, branches, places that one branch alone reaches, measures.
     """
-    from armkin.reachability.reach_cells import MOST, Grid
+    from armkin.reachability.reach_cells import MAX_CELLS, Grid
 
     arm = arguments.load_arm(robot, scene)
-    step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MOST)
-    direction_count, turns = whole_number(directions, "--directions", 1, MOST), whole_number(rolls, "--rolls", 1, MOST)
+    step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MAX_CELLS)
+    direction_count, turns = (
+        whole_number(directions, "--directions", 1, MAX_CELLS),
+        whole_number(rolls, "--rolls", 1, MAX_CELLS),
+    )
     cells = len(Grid(arm, step, ring, direction_count, turns, tool_down).rings) * ring
     with output.progress("cells", cells) as tick:
         reach_map = armkin.reach(

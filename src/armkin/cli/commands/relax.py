@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
     from armkin.model.arm import Arm
 
-_LONGEST = 3600.0  # time [s], at most, that the arm is relaxed and recorded
+_MAX_SECONDS = 3600.0  # time [s], at most, that the arm is relaxed and recorded
 _RATE = 10  # rows a second
 
 
@@ -41,8 +41,8 @@ def relax(
     arm = arguments.load_arm(robot)
     board = _with_servos(arm)
     time = number(seconds, "--seconds")
-    if not 0 <= time <= _LONGEST:
-        raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_LONGEST:g}")
+    if not 0 <= time <= _MAX_SECONDS:
+        raise UsageError(f"--seconds: '{seconds}' must be from 0 to {_MAX_SECONDS:g}")
     with board_link.open_backend(board, port, baud, reset=not no_reset) as machine, output.destination(out) as write:
         board.relax()
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")

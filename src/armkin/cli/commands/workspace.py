@@ -74,7 +74,7 @@ def workspace(
     half a pulse off, in the worst combination.
     """
     from armkin.reachability import cloud_file
-    from armkin.reachability.sampling import MOST
+    from armkin.reachability.sampling import MAX_SAMPLES
 
     arm = arguments.load_arm(robot, scene, tool)
     if out is not None:
@@ -83,7 +83,7 @@ def workspace(
         raise UsageError("--color is for the picture; add --plot FILE")
     shade = color or "manipulability"
     measures, keep = _measures_and_kept(measure, None if plot is None else shade)
-    count = None if samples is None else whole_number(samples, "--samples", 1, MOST)
+    count = None if samples is None else whole_number(samples, "--samples", 1, MAX_SAMPLES)
     points = None if grid is None else _grid_points(grid)
     total = count or 100_000
     if points is not None:
@@ -116,12 +116,12 @@ def _measures_and_kept(names: list[str] | None, shade: str | None) -> tuple[list
     measures = list(dict.fromkeys(names or ()))
     if shade is None:
         return measures, 0
-    from armkin.plot.workspace_picture import KEEP
+    from armkin.plot.workspace_picture import ENOUGH_SAMPLES
     from armkin.reachability.dexterity import MEASURES
 
     if shade in MEASURES and shade not in measures:
         measures.append(shade)
-    return measures, KEEP
+    return measures, ENOUGH_SAMPLES
 
 
 def _compiled_tips(arm: Arm, q: Array) -> Array:
@@ -131,12 +131,12 @@ def _compiled_tips(arm: Arm, q: Array) -> Array:
 
 def _grid_points(grid: str) -> list[int]:
     """`--grid 10` or `--grid 10,20,30`."""
-    from armkin.reachability.sampling import MOST
+    from armkin.reachability.sampling import MAX_SAMPLES
 
     words = grid.split(",")
     if len(words) == 1 and (parts := grid.lower().replace("*", "x").split("x"))[1:] and all(map(is_number, parts)):
         raise UsageError(f"--grid {grid}: separate the counts with commas: {','.join(part.strip() for part in parts)}")
-    return [whole_number(word, "--grid", 1, MOST) for word in words]
+    return [whole_number(word, "--grid", 1, MAX_SAMPLES) for word in words]
 
 
 def _answer(survey: Workspace) -> Answer:

@@ -43,7 +43,7 @@ _NAMED = {  # numbers that the method reads, by the names that they have in Pyth
 }  # fmt: skip
 BRANCHES = MAX_ANSWERS
 ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
-OWN = 2  # pencils of its own that a kind of poses has
+OWN_PENCILS = 2  # pencils of its own that a kind of poses has
 PASSES = 4  # passes, of the seven, that the C code makes; what they leave open is told as doubt
 
 
@@ -59,9 +59,9 @@ def _is_read(pencil: Pencil) -> bool:
 
 def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
     """The pencils of poses of each kind: the first two are the kind's own, if they have a form, to keep data few."""
-    every = [elimination.of_kind(kind)[:OWN] for kind in Kind]
+    every = [elimination.of_kind(kind)[:OWN_PENCILS] for kind in Kind]
     usual = elimination.plans[:passes]
-    return [(*pencils, *usual[OWN:]) if all(map(_is_read, pencils)) else usual for pencils in every]
+    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in every]
 
 
 def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _PARTS = Path(__file__).parent / "parts"
-_ALONE = 1e-6  # distance [rad] from half a turn from which on a limit leaves one copy of a value
+_ONE_COPY = 1e-6  # distance [rad] from half a turn from which on a limit leaves one copy of a value
 _ROUNDED = 5e-6  # distance from orthonormal, at most, of a pose of six printed digits
 _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
  *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
@@ -251,7 +251,7 @@ def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
     if slides:
         return [f"value = q[{j}];", *check, f"slid += {change};"]
     copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_js_text(low)}, {_js_text(high)}, {_js_text(slides)});"
-    if low > -np.pi + _ALONE and high < np.pi - _ALONE:  # there is one copy, wherever `near` is
+    if low > -np.pi + _ONE_COPY and high < np.pi - _ONE_COPY:  # there is one copy, wherever `near` is
         nearest = ["if (!(Math.abs(value) < Math.PI - SLACK)) {", copy, "}", *check]
     else:
         usual = " && ".join([f"Math.abs(value - near[{j}]) < Math.PI - SLACK", *tests])

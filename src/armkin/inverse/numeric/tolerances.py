@@ -161,4 +161,4 @@ LOOSE_DOUBLE = 1e-9  # squared length, as LOOSE, at a root of fourth order, of w
 SHAKE = 1e-4  # distance [reaches, rad] by which a target is moved to where nothing is free
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # way that each pass of an elimination moves the pose
 SLOW_DISTANCE = 1e-3  # distance [rad, scaled length] of candidates that have not converged and take more steps
-FINEST = 3e-6  # first point, as a share of a span, at which a residual is compared
+FIRST_POINT = 3e-6  # first point, as a share of a span, at which a residual is compared

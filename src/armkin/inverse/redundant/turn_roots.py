@@ -19,10 +19,10 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import tolerances as tol
 
 TERMS = 12  # terms of a Taylor series
-WIDE = 0.35  # half a cell's width times the degree: what is left out is 1e-14 of the polynomial's size
+CELL_WIDTH = 0.35  # half a cell's width times the degree: what is left out is 1e-14 of the polynomial's size
 HALVINGS = 28  # halvings of a cell, at most
-MORE = 4  # coefficients above the degree that the samples tell, too
-ASIDE = 0.15  # distance [rad] of the samples from the real values
+TAIL = 4  # coefficients above the degree that the samples tell, too
+SHIFT = 0.15  # distance [rad] of the samples from the real values
 SAFE = 4.0  # safety factor on the rounding that the samples show
 STEPS = 8  # steps of Newton's method in a cell in which a polynomial is monotone
 
@@ -39,7 +39,7 @@ class Roots(NamedTuple):
 def _cells(degree: int) -> tuple[Array, float, Array]:
     """Middles of cells (C,), half their width, and the Taylor coefficients there, for one half, of a polynomial by the
     real and the imaginary parts of its coefficients: (2 degree + 2, C TERMS)."""
-    count = math.ceil(np.pi * degree / WIDE)
+    count = math.ceil(np.pi * degree / CELL_WIDTH)
     middle, half = -np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count), np.pi / count
     k, order = np.arange(degree + 1), np.arange(TERMS)
     factor = (1j * k[:, None] * half) ** order / np.array([math.factorial(i) for i in order])
@@ -51,9 +51,9 @@ def _cells(degree: int) -> tuple[Array, float, Array]:
 
 @lru_cache(maxsize=8)
 def _coefficients(degree: int) -> NDArray[np.complex128]:
-    """Those of exp(i k t), k from 0 to degree + MORE, of values at samples: (M, degree + MORE + 1)."""
+    """Those of exp(i k t), k from 0 to degree + TAIL, of values at samples: (M, degree + TAIL + 1)."""
     t = sampled_at(degree)
-    return np.asarray(np.exp(-1j * t[:, None] * np.arange(degree + MORE + 1)) / len(t))
+    return np.asarray(np.exp(-1j * t[:, None] * np.arange(degree + TAIL + 1)) / len(t))
 
 
 @lru_cache(maxsize=1)
@@ -68,8 +68,8 @@ def _halving_matrices() -> Array:
 
 def sampled_at(degree: int) -> NDArray[np.complex128]:
     """Where polynomials of a degree are asked (M,): aside of the real values, at which quotients may be 0 / 0."""
-    samples = 2 * (degree + MORE) + 1
-    return np.asarray(np.arange(samples) * (2 * np.pi / samples) - 1j * ASIDE)
+    samples = 2 * (degree + TAIL) + 1
+    return np.asarray(np.arange(samples) * (2 * np.pi / samples) - 1j * SHIFT)
 
 
 def roots(values: NDArray[np.complex128], degree: int) -> Roots:
@@ -78,7 +78,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     F, order = len(values), np.arange(TERMS)
     c = values @ _coefficients(degree)
     # the coefficients' errors shrink with their order, as the samples lie off the real line
-    c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(ASIDE * np.arange(degree + 1, degree + MORE + 1))
+    c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(SHIFT * np.arange(degree + 1, degree + TAIL + 1))
     slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
     index, angle = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)

@@ -16,7 +16,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-BESIDE = 0.1  # share of the distance of two roots, up to which a posture may stand from the one halfway
+BESIDE_SHARE = 0.1  # share of the distance of two roots, up to which a posture may stand from the one halfway
 ROOT = 0.03  # share of that distance: the next Newton step of an exact root is shorter, beside one of order 16 longer
 
 
@@ -34,7 +34,7 @@ def solves_between(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigm
     if len(doubtful):
         third, size = newton.correct(arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH)
         moved = np.abs(newton.difference(arm, third, halfway[doubtful])).max(axis=1)
-        solves[doubtful] = (moved < BESIDE * far[doubtful]) & (size <= tol.SOLUTION)
+        solves[doubtful] = (moved < BESIDE_SHARE * far[doubtful]) & (size <= tol.SOLUTION)
     return np.asarray(solves)
 
 

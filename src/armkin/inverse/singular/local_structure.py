@@ -28,7 +28,7 @@ SHRINKS = 3  # times that a span is shortened at most
 LENGTH_RATIO = 0.25, 2.0  # length of a span, at least and at most, relative to the last one
 STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
-POINTS = np.concatenate([[0.0], np.geomspace(tol.FINEST, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
+POINTS = np.concatenate([[0.0], np.geomspace(tol.FIRST_POINT, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
 SIGNS = np.array([1.0, -1.0])[:, None, None]  # senses of a curve: both ways
 BACK = 5  # steps, at most, back onto the curve
 SERIES = 0.01  # distance [rad, reaches] up to which a series of second order is compared with g

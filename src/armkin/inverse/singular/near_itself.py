@@ -15,7 +15,7 @@ from armkin.inverse.answers.batch import Batch, Goals, complete_labels, empty_ba
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.high_order_roots import BESIDE
+from armkin.inverse.singular.high_order_roots import BESIDE_SHARE
 from armkin.inverse.singular.self_motions import pull_back
 from armkin.inverse.tasks.task import Task
 from armkin.model import limits
@@ -115,7 +115,7 @@ def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
         halfway = near[rows[k]] + 0.5 * way[k, b] * radian_or_reach(arm)
         beside, size = pull_back(arm, task, halfway, target[rows[k]], steps)
         moved = newton.wrapped_distance(arm, beside, halfway)
-        same[k, b] = (size <= most[rows[k]]) & (moved <= BESIDE * away[k, b])
+        same[k, b] = (size <= most[rows[k]]) & (moved <= BESIDE_SHARE * away[k, b])
     place, stays = np.where(same, away, np.inf).argmin(axis=1), same.any(axis=1)
     count = batch.valid[rows].sum(axis=1)
     place = np.where(stays, place, count)

@@ -21,10 +21,10 @@ from armkin.motion.branches.linked_branches import ENDS
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_NEAR = 10 * ENDS  # distance [mm] of a chain's end before the boundary
-_ALIKE = 1e-3  # distance [rad | mm] between the ends of two chains that are one
-_SAME = 1e-4  # distance [rad | mm] between two postures that are one
-_MOST = 8  # boundaries on the way, at most: a path along one has thousands, and its chains go on anyway
+_END_DISTANCE = 10 * ENDS  # distance [mm] of a chain's end before the boundary
+_SAME_END = 1e-3  # distance [rad | mm] between the ends of two chains that are one
+_SAME_POSTURE = 1e-4  # distance [rad | mm] between two postures that are one
+_MAX_BOUNDARIES = 8  # boundaries on the way, at most: a path along one has thousands, and its chains go on anyway
 _WAYS = 64  # chains, at most, as every boundary may multiply them: what goes through one more boundary comes last
 
 
@@ -53,8 +53,8 @@ def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
     """Samples between start and end on a boundary beside which a chain ends; none where they are many."""
     ends = np.unique([sample for c in chains for sample in (c.first, c.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
-    rows = [j for j in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[j]).min() <= _NEAR]
-    return rows if len(rows) <= _MOST else []
+    rows = [j for j in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[j]).min() <= _END_DISTANCE]
+    return rows if len(rows) <= _MAX_BOUNDARIES else []
 
 
 def _add_new_chains(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
@@ -69,10 +69,10 @@ def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain
     """
     bridged = list(chains)
     for a in chains:
-        behind = [b for b in bridged if a.last < b.first and s[b.first] - s[a.last] <= _NEAR and len(b.q) > 1]
-        for b in behind[:_MOST] if len(a.q) > 1 else []:
+        behind = [b for b in bridged if a.last < b.first and s[b.first] - s[a.last] <= _END_DISTANCE and len(b.q) > 1]
+        for b in behind[:_MAX_BOUNDARIES] if len(a.q) > 1 else []:
             step = joint_change(a.arm, a.q[-1], b.q[0])
-            if np.abs(step).max() > _ALIKE or float(chord_bound(levers(a.arm), step)) > tolerance:
+            if np.abs(step).max() > _SAME_END or float(chord_bound(levers(a.arm), step)) > tolerance:
                 continue
             share = (s[a.last + 1 : b.first + 1] - s[a.last]) / (s[b.first] - s[a.last])
             between = a.q[-1] + share[:, None] * step
@@ -86,7 +86,7 @@ def _chains_to(s: Array, c: Chain, j: int, postures: Array, tolerance: float) ->
     if c.first < j <= c.last:
         return [c] if c.last == j else [Chain(c.arm, c.first, c.q[: j + 1 - c.first], c.labels[: j + 1 - c.first])]
     gap = s[j] - s[c.last]
-    if c.last > j or gap > _NEAR:
+    if c.last > j or gap > _END_DISTANCE:
         return []
     share = 1 - ((s[j] - s[c.last + 1 : j + 1]) / gap) ** 0.5  # joints leave a boundary as roots do
     made = []
@@ -121,7 +121,7 @@ def _are_consecutive(a: Chain, b: Chain) -> bool:
     """Whether a chain begins where another ends, and is not its own continuation."""
     step = joint_change(a.arm, a.q[-1], b.q[0])
     same = np.shares_memory(a.q, b.q)  # parts of one chain
-    return not same and float(np.abs(step).max()) < _SAME
+    return not same and float(np.abs(step).max()) < _SAME_POSTURE
 
 
 def _join_chains(a: Chain, b: Chain) -> Chain:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _STEPS, _STAYS = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
 _BLOCK = 16_384  # samples solved at once at most
-_APART = 8  # stride of the few samples that are solved first
+_STRIDE = 8  # stride of the few samples that are solved first
 
 
 @dataclass
@@ -97,9 +97,9 @@ class Samples:
         From a singular posture on, where all may be dear to examine, a few of them are solved first: between two that
         are out of reach nobody looks.
         """
-        if len(s) <= 2 * _APART or self.solve_at(s[:1]).status[0] != Status.SINGULAR:
+        if len(s) <= 2 * _STRIDE or self.solve_at(s[:1]).status[0] != Status.SINGULAR:
             return self.solve_at(s)
-        sparse = np.append(np.arange(0, len(s) - 1, _APART), len(s) - 1)
+        sparse = np.append(np.arange(0, len(s) - 1, _STRIDE), len(s) - 1)
         sampled = self.solve_at(s[sparse])
         if (sampled.status == Status.SINGULAR).all():
             self.stays = True

@@ -21,7 +21,7 @@ from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import ENDS, link_branches
 from armkin.motion.branches.route_grid import Way, refine_grid
-from armkin.motion.branches.wrist_turn import ASIDE, add_wrist_chains, has_wrist
+from armkin.motion.branches.wrist_turn import ASIDE_SHARE, add_wrist_chains, has_wrist
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
@@ -37,9 +37,9 @@ if TYPE_CHECKING:
 _GRID = 1000  # points, at least, of a route's grid
 _STEP = 1.0  # distance [mm], at most, between the first samples
 _SAMPLES = (200, 20_000)  # samples of a route, at least and at most
-_MANY = 8  # rests from which on what lies between them is planned together, so many samples at once
+_MANY_RESTS = 8  # rests from which on what lies between them is planned together, so many samples at once
 _AT_ONCE = 8192  # samples between rests that are planned at once
-_FARTHEST = 2.0  # distance [mm], at most, between the samples of a path that has more
+_MAX_DISTANCE = 2.0  # distance [mm], at most, between the samples of a path that has more
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ class CarriedRoute:
 
 def route_samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
-    number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _FARTHEST))
+    number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _MAX_DISTANCE))
     even = np.linspace(0.0, route.length, max(number, 2))
     return np.asarray(_drop_close_values(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
@@ -112,7 +112,7 @@ def carry_route(
     every_chain = chains_of_columns(arm, columns)
     every_chain = add_boundary_chains(arm, columns, every_chain, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
-        aside = 0.0 if len(route.given_points[0]) else ASIDE * tolerance  # a curve of points has little tolerance left
+        aside = 0.0 if len(route.given_points[0]) else ASIDE_SHARE * tolerance  # a curve of points leaves little of it
         every_chain = add_wrist_chains(arm, route, columns, every_chain, pace.turn, aside)
     starts = _start_chains(arm, every_chain, fixed)
     if branch is not None:
@@ -199,7 +199,7 @@ def run_stretches(
 
 def _group_rests(edges: list[float], s: Array) -> list[list[float]]:
     """Places of rest, from one to the next; where there are many, some together: between them all is independent."""
-    if len(edges) <= _MANY:
+    if len(edges) <= _MANY_RESTS:
         return [list(pair) for pair in pairwise(edges)]
     first = np.flatnonzero(np.diff(np.searchsorted(s, edges[:-1]) // _AT_ONCE, prepend=-1)).tolist()
     return [edges[a : b + 1] for a, b in pairwise([*first, len(edges) - 1])]

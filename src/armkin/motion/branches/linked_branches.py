@@ -21,12 +21,12 @@ from armkin.motion.branches.joint_steps import chord_bound, joint_change, larges
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SHORTEST = 1e-9  # step, as a share of the route, below which what is not linked is a jump
+MIN_STEP = 1e-9  # step, as a share of the route, below which what is not linked is a jump
 ENDS = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
-_TORN = 3  # parts of a step in which branches end: where they are more, branches end everywhere
+_TORN_PARTS = 3  # parts of a step in which branches end: where they are more, branches end everywhere
 _PARTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
 _AT_ONCE = 1024  # samples solved at once, if the parts are no fewer
-_MOST = 50_000  # samples added at most
+_MAX_SAMPLES = 50_000  # samples added at most
 _BLOCK = 16_384  # steps looked at together
 
 
@@ -126,14 +126,14 @@ class _Linking:
         """
         c = self.columns
         h = np.diff(c.s)
-        least = np.where(self.both, max(SHORTEST * self.length, 1e-9), ENDS)
+        least = np.where(self.both, max(MIN_STEP * self.length, 1e-9), ENDS)
         steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
         # Ends need no more than the formulas; their samples on edges are dear to examine.
         singular = c.status == Status.SINGULAR
         plain = ~(self.both | singular[:-1] | singular[1:])[steps]
         quick = bool(plain.any())
         steps = steps[plain] if quick else steps
-        if not len(steps) or self.added > _MOST:
+        if not len(steps) or self.added > _MAX_SAMPLES:
             return False
         parts = int(np.clip(_AT_ONCE // len(steps), *_PARTS))
         f = np.arange(1, parts) / parts
@@ -158,7 +158,7 @@ class _Linking:
         """Leave what no dividing links: steps (M, parts) of singular postures, whose free joints stand anywhere."""
         singular = self.columns.status == Status.SINGULAR
         inside = (singular[:-1] & singular[1:])[steps]
-        mostly_torn = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN
+        mostly_torn = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN_PARTS
         self.torn[steps[mostly_torn & inside]] = False
 
     def _link(self) -> None:

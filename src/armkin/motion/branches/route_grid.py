@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 _TIMES = 16.0  # factor, at most, on the number of points where the tolerance needs more
 _ROUNDS = 8  # rounds in which intervals are divided
 _BLOCK = 8192  # points looked at together
-_COARSE = 0.05  # step [mm], at most, if the tolerance is not larger
+_COARSE_STEP = 0.05  # step [mm], at most, if the tolerance is not larger
 _TURN = 1.6  # turn [rad] below which a step may be coarser where slopes are exact
-_EACH = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
-_FEWEST = 2  # points of a section where slopes are exact: they need no neighbours
+_SECTION_POINTS = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
+_MIN_POINTS = 2  # points of a section where slopes are exact: they need no neighbours
 _GROWTH = 2.5  # ratio of an interval to the next one, at most: motions speed up and slow down beside bends
 _GROWS = 1.3  # excess of that ratio, as a factor, that stays: the interval is hardly longer
-_AROUND = 0.5  # length [mm] of the way about a given point
-_ALIKE = 1e-3  # relative difference of distances that are alike: the first place is told
+_AROUND_LENGTH = 0.5  # length [mm] of the way about a given point
+_SAME_DISTANCE = 1e-3  # relative difference of distances that are alike: the first place is told
 _REST = 32  # intervals, at least, from rest to rest where there are many rests
 _MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
 
@@ -58,7 +58,7 @@ def refine_grid(arm: Arm, way: Way, number: int, tolerance: float | None, exact:
     """
     route = way.route
     exact = exact and len(route.spans) > 0 and not way.windows
-    points, breaks = _initial_grid(arm, way, number, _FEWEST if exact else _EACH[0])
+    points, breaks = _initial_grid(arm, way, number, _MIN_POINTS if exact else _SECTION_POINTS[0])
     if exact:
         points, breaks = _grade_grid(points, breaks)
     resting = _nearest_indices(points[breaks], way.stops)
@@ -105,7 +105,7 @@ def _initial_grid(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, 
     measure = np.concatenate([[0.0], np.cumsum(moved.max(axis=1))])
     levels = np.interp(edges, s, measure)
     total = max(float(levels[-1] - levels[0]), 1e-12)
-    least_count = int(np.clip(2 * number / (len(edges) - 1), fewest, _EACH[1]))
+    least_count = int(np.clip(2 * number / (len(edges) - 1), fewest, _SECTION_POINTS[1]))
     share = _MOTION * np.diff(levels) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
     least = np.full(len(share), least_count)
     if len(stops):
@@ -128,7 +128,7 @@ def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, ex
     """How many times too long intervals without rests are (M,), by `distance` from the route and the way from their
     chord."""
     deviations, steps, h = (np.delete(values, path.rests) for values in (distance, _chord_bounds(arm, path), path.h))
-    coarse = np.sqrt(steps / max(tolerance, _COARSE))  # of second order in h
+    coarse = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
         coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
     return np.maximum(np.cbrt(deviations / tolerance), coarse)  # of third order in h
@@ -243,12 +243,12 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
         while k not in sure:  # in a tight bend the search may have left it: the worst is looked for place by place
             sure.add(k)
             k = int(distance.argmax())
-            near = np.clip(s[i + k] + np.linspace(-_AROUND, _AROUND, 401), path.s[0], path.s[-1])
+            near = np.clip(s[i + k] + np.linspace(-_AROUND_LENGTH, _AROUND_LENGTH, 401), path.s[0], path.s[-1])
             offsets = given_points[k] - position(arm, path.evaluate(near)[0])[:, : given_points.shape[1]]
             distance[k] = min(distance[k], float(np.linalg.norm(offsets, axis=1).min()))
         most = float(distance[k])
-        if worst is None or most > worst[0] * (1 + _ALIKE):
-            worst = most, float(s[i + int((distance >= most * (1 - _ALIKE)).argmax())])
+        if worst is None or most > worst[0] * (1 + _SAME_DISTANCE):
+            worst = most, float(s[i + int((distance >= most * (1 - _SAME_DISTANCE)).argmax())])
         worst = max(most, worst[0]), worst[1]
     return worst
 

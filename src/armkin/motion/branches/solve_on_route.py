@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad] at first, and where that swings joints round beside a singularity
 _BLOCK = 8192  # points looked at together
 _SETTLED = 1e-8  # relative length of a Newton step after which the next one would be nothing
-_SHORT, _QUADRATIC = 1e-5, 1e-3  # relative length of a step, and its ratio to the one before: the next one is nothing
-_ASIDE = 1e-6  # distance [mm] along the route to the target that tells a slope
-_TELLING = 0.02  # damping [mm/rad] of slopes: rounding is multiplied little
+_SHORT_STEP, _STEP_RATIO = 1e-5, 1e-3  # relative length of a step, and ratio to the one before, that end the method
+_SLOPE_DISTANCE = 1e-6  # distance [mm] along the route to the target that tells a slope
+_SLOPE_DAMPING = 0.02  # damping [mm/rad] of slopes: rounding is multiplied little
 _LOST = 1e-5  # share of a slope that damping takes: where it is more a singularity is near
 
 
@@ -50,7 +50,7 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
         solved[open_] = q + step.T * unit
         # where a step is so much shorter than the one before, the next one would be nothing
-        going = (size >= _SETTLED) & ((size > _SHORT) | (size > _QUADRATIC * before))
+        going = (size >= _SETTLED) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * before))
         open_, before = open_[going], size[going]
         if not len(open_):
             break
@@ -119,7 +119,7 @@ def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, co
     ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
     number = np.flatnonzero(unsolved)
     for part in (number[i : i + _BLOCK] for i in range(0, len(number), _BLOCK)):
-        slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_ASIDE, _ASIDE))
+        slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_SLOPE_DISTANCE, _SLOPE_DISTANCE))
         if slopes is None:
             return None
         d[part] = slopes
@@ -134,7 +134,7 @@ def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> 
     aside = s + detour_slope
     misses, misses_aside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, aside))
     rate = (misses_aside - misses) / (aside - s)
-    d = _damped_steps(J, rate, (_TELLING / arm.reach) ** 2)
+    d = _damped_steps(J, rate, (_SLOPE_DAMPING / arm.reach) ** 2)
     unexplained = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
     if not (unexplained <= _LOST * np.abs(rate).max(axis=0)).all():
         return None

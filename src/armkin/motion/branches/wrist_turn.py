@@ -29,18 +29,18 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
-ASIDE = 0.5  # share of the tolerance by which the tip may go aside
-_NEAR = 2.0  # distance [tolerances] from straight beyond which a wrist is not looked at
+ASIDE_SHARE = 0.5  # share of the tolerance by which the tip may go aside
+_NEAR_DISTANCE = 2.0  # distance [tolerances] from straight beyond which a wrist is not looked at
 _ARM = 0.1  # movement [rad] of the first three joints between two postures that are a flip of the wrist apart
 _HALF, _GROW, _WIDTHS = 0.25, 1.5, 14  # half [mm] of the least window; factor from one to the next; how many are tried
 _GAP = 0.1  # distance [mm] between the end of one window and the begin of the next
 _STEP = 0.01  # distance [mm] to either side at which slopes are taken
 _LOOKED = 97  # places in a window at which the tool's rotation is looked at
-_MOST = 16  # singularities, at most, on the way
-_EXACT = 1e-6  # error [mm and rad] below which a posture meets its target
+_MAX_SINGULARITIES = 16  # singularities, at most, on the way
+_EXACT_ERROR = 1e-6  # error [mm and rad] below which a posture meets its target
 _ROUNDING = 1e-12  # share of the wrist's volume that is rounding
 _TOLD = 1e-4  # share of the wrist's volume below which it does not tell joint 4
-_LEAST = 1e-8  # weight [1/mm] of a millimetre beside a radian where the tool's direction must be kept
+_MIN_WEIGHT = 1e-8  # weight [1/mm] of a millimetre beside a radian where the tool's direction must be kept
 _STEPS = 8  # steps of Newton's method to a straight wrist
 
 
@@ -66,8 +66,8 @@ def add_wrist_chains(
     turn: [rad] by which the tool may be turned for it, tip_offset: [mm] that the tip may go.
     """
     s, all_chains, latest = columns.s, list(chains), list(chains)
-    near = _NEAR * max(np.sin(turn), tip_offset / LEAST_LEVER)
-    for _ in range(_MOST):
+    near = _NEAR_DISTANCE * max(np.sin(turn), tip_offset / LEAST_LEVER)
+    for _ in range(_MAX_SINGULARITIES):
         joined_chains = []
         for c in latest:
             for j in _straight_samples(arm, c, near):
@@ -77,7 +77,7 @@ def add_wrist_chains(
                     joined = _chain_through_window(arm, route, s, c, next_chain, j, (turn, tip_offset))
                     joined_chains += [] if joined is None else [joined]
         all_chains, latest = all_chains + joined_chains, joined_chains
-        if not joined_chains or len(all_chains) > _MOST * len(chains):
+        if not joined_chains or len(all_chains) > _MAX_SINGULARITIES * len(chains):
             break
     return all_chains
 
@@ -202,8 +202,8 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
         along = (beyond - target)[:3, 3] / _STEP
         T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
         displacement = T[:3, 3] - target[:3, 3]
-        miss = np.concatenate([-_LEAST * displacement, _small_turns(T, target)])
-        posture[free] += np.linalg.lstsq(np.concatenate([_LEAST * J[:3], J[3:]]), miss, rcond=1e-9)[0]
+        miss = np.concatenate([-_MIN_WEIGHT * displacement, _small_turns(T, target)])
+        posture[free] += np.linalg.lstsq(np.concatenate([_MIN_WEIGHT * J[:3], J[3:]]), miss, rcond=1e-9)[0]
         length += float(displacement @ along)  # what leads along the path is no way aside
     return replace(window, turned=0.0, detour=Detour(window.begin, window.end, displacement))
 
@@ -213,7 +213,7 @@ def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
     s = np.linspace(window.begin, window.end, _LOOKED)
     T, goal = fk(arm, _joints_in_window(arm, route, window, s)), add_detours(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
-    return bool(missed < _EXACT)
+    return bool(missed < _EXACT_ERROR)
 
 
 def _small_turns(T: Array, target: Array) -> Array:

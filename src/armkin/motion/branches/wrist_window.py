@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.tool_path.route import Detour, Route
 
 _STEPS = 12  # steps of Newton's method
-_LONGEST = 0.1  # length [rad], at most, of a step of Newton's method
+_MAX_STEP = 0.1  # length [rad], at most, of a step of Newton's method
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Window:
             # the first three joints may be exactly singular somewhere
             step = nudged(np.linalg.solve, np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]
             size = np.abs(step).max(axis=1, initial=1e-300, keepdims=True)
-            q[:, :3] += np.minimum(_LONGEST / size, 1.0) * step
+            q[:, :3] += np.minimum(_MAX_STEP / size, 1.0) * step
             if size.max(initial=0.0) < 1e-13:
                 break
         return np.asarray(q + offset)

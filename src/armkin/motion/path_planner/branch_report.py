@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.branches.branch_path import CarriedRoute
     from armkin.motion.timing.trajectory import Trajectory
 
-_SAME = 1e-6  # distance [rad | mm] of two postures that are one
+_SAME_POSE = 1e-6  # distance [rad | mm] of two postures that are one
 _WHY = {
     "end": "carries all",
     "reach": "the path leaves the reach",
@@ -73,7 +73,7 @@ def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch
     for _, branch in ranked:
         q = branch.start_joints
         if not any(
-            b.name == branch.name and np.abs(joint_change(arm, b.start_joints, q)).max() < _SAME for b in distinct
+            b.name == branch.name and np.abs(joint_change(arm, b.start_joints, q)).max() < _SAME_POSE for b in distinct
         ):
             distinct.append(branch)
     return distinct

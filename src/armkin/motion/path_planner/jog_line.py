@@ -25,9 +25,9 @@ if TYPE_CHECKING:
 
 TOP = 250.0  # speed [mm/s] of the tool at 100 %: ISO 10218-1 allows no more while somebody guides an arm by hand
 TURNING = np.deg2rad(60.0)  # speed [rad/s] at which the tool turns at 100 %
-LONGEST = 10.0  # time [s], at most, of a line
+MAX_SECONDS = 10.0  # time [s], at most, of a line
 STEP = 2.0  # distance [mm], or hundredths of a radian, between postures that are looked at
-SLOWEST = 0.1  # share of TOP: where joints at full speed carry the tool slower than this, a singularity is near
+SLOW_SHARE = 0.1  # share of TOP: where joints at full speed carry the tool slower than this, a singularity is near
 Frame = Literal["base", "tool"]
 
 
@@ -57,7 +57,7 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     turns = axis not in ("x", "y", "z")
     top = TURNING if turns else TOP
     step = np.sign(share) * (STEP / 100 if turns else STEP)
-    most = max(int(min(LONGEST * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
+    most = max(int(min(MAX_SECONDS * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
     count, why = _steps_carried(arm, task, q, axis, frame, step, most)
     while count:
         target = _shift_target(arm, task, q, axis, frame, step * count)
@@ -84,7 +84,7 @@ def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step
         move = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
         blocked = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
         first = move * unit
-        slow = float(np.max(np.abs(first) / arm.max_speed)) * SLOWEST * top / abs(step)
+        slow = float(np.max(np.abs(first) / arm.max_speed)) * SLOW_SHARE * top / abs(step)
         if blocked or (slow > 1.0 and slow >= before):
             return 0 if leaving and k == 2 else k - 1, "a singularity is near"
         before, leaving = slow, slow > 1.0

@@ -244,7 +244,7 @@ class Walk:
         tolerance = self.pace.tolerance
         pauses = frozenset(self.pauses)
         route, order = join_pieces(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
-        if route.length < path_pieces.SMALL:
+        if route.length < path_pieces.MIN_LENGTH:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
         near = self.q if self.options.near is None else self.options.near

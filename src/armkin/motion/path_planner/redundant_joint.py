@@ -30,11 +30,11 @@ if TYPE_CHECKING:
 
 VALUES = 72  # values of the redundant joint, over its range, that are asked
 STEP = 0.02  # distance, as a share of the arm's reach, between targets that are asked
-ASKED = 200  # targets of a way, at most, that are asked
-AWAY = 0.01  # distance, as a share of the arm's reach, that values had best keep from what must not be touched
+MAX_TARGETS = 200  # targets of a way, at most, that are asked
+GAP = 0.01  # distance, as a share of the arm's reach, that values had best keep from what must not be touched
 POSTURES = 8_000  # targets, at most, that are asked for that distance
-MOST = 6  # values, at most, that are planned for
-SAME = 1e-9  # difference [rad] of values of joint moves that are one
+MAX_VALUES = 6  # values, at most, that are planned for
+SAME_VALUE = 1e-9  # difference [rad] of values of joint moves that are one
 
 
 def path_redundant(arm: Arm, file: PathFile, spare: Redundancy, request: PathRequest) -> PathPlan:
@@ -103,7 +103,7 @@ def _redundant_start(arm: Arm, file: PathFile, joint: int, standing: Array) -> f
             continue
         if first is None:
             first = value
-        elif abs(value - first) > SAME:
+        elif abs(value - first) > SAME_VALUE:
             a, b = np.rad2deg([first, value])
             message = f"{name} is redundant and held along a path: it cannot be at {a:g} and then at {b:g} deg"
             advice = "write two paths, or hold another joint"
@@ -132,7 +132,7 @@ def _path_of_other_joints(arm: Arm, file: PathFile, joint: int) -> PathFile:
 def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, start: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
-    Those at which it hits nothing come first, and of these those that keep `AWAY`; then the nearest to `close`. Where
+    Those at which it hits nothing come first, and of these those that keep `GAP`; then the nearest to `close`. Where
     there is none, the one at which most have. A way that begins where the joints stand keeps them there.
     """
     turned = actual_arm(arm)
@@ -148,18 +148,18 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, sta
     joint_angles = t * arm.ratio[j]
     lacking = np.zeros((1, len(t)), int)
     for way in ways:
-        lacking += _count_lacking(turned, spare, way, joint_angles, ASKED, [])
+        lacking += _count_lacking(turned, spare, way, joint_angles, MAX_TARGETS, [])
     order = np.argsort(np.abs(t - close), kind="stable")
     carried = order[lacking[0, order] == lacking.min()]
     if turned.keep_out and not turned.ignores_keep_out and len(carried) > 1:
         # near a keep-out a proof takes long: values that keep away from it come first
-        margins = [0.0, AWAY * turned.reach]
+        margins = [0.0, GAP * turned.reach]
         count = max(POSTURES // (len(carried) * len(ways)), 2)
         near = np.zeros((3, len(carried)), int)
         for way in ways:
-            near += _count_lacking(turned, spare, way, joint_angles[carried], min(count, ASKED), margins)
+            near += _count_lacking(turned, spare, way, joint_angles[carried], min(count, MAX_TARGETS), margins)
         carried = carried[np.lexsort((near[2] > 0, near[1]))]
-    yield from t[carried[: MOST if lacking.min() == 0 else 1]].tolist()
+    yield from t[carried[: MAX_VALUES if lacking.min() == 0 else 1]].tolist()
 
 
 def _count_lacking(

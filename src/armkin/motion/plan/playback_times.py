@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 _FIRST = 0.5  # time [s], at most, between two of the first samples
-_INSIDE = (0.21, 0.5, 0.79)  # parameters between two samples at which the motion is looked at
+_INNER_PARAMETERS = (0.21, 0.5, 0.79)  # parameters between two samples at which the motion is looked at
 
 
 def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
@@ -52,7 +52,7 @@ def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
     first, last = plan.q(a), plan.q(b)
     tips = [position(arm, first), position(arm, last)]
     errors = np.zeros(len(a))
-    for share in _INSIDE:
+    for share in _INNER_PARAMETERS:
         true_tip = position(arm, plan.q(a + share * (b - a)))
         joint_tip = position(arm, first + share * (last - first))
         errors = np.maximum(errors, np.linalg.norm(joint_tip - true_tip, axis=1))

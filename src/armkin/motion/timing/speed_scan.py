@@ -8,10 +8,10 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Int
 
-_FEWEST, _MOST = 8, 4096  # intervals followed one by one, at least and at most, before it is asked whether that can end
-_TOGETHER = 32  # runs beyond which they go side by side
-_LONGEST = 64  # steps of runs side by side while there are few of them
-_TIMES = 8  # rounds after which runs go one by one in any case
+_MIN_INTERVALS, _MAX_INTERVALS = 8, 4096  # intervals followed one by one before it is asked if that can end
+_MANY_RUNS = 32  # runs beyond which they go side by side
+_MAX_STEPS = 64  # steps of runs side by side while there are few of them
+_MAX_ROUNDS = 8  # rounds after which runs go one by one in any case
 
 
 class Least(NamedTuple):
@@ -100,11 +100,11 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     first = np.append(
         0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1))
     )  # of each interval's other functions
-    for _ in range(_TIMES):
+    for _ in range(_MAX_ROUNDS):
         reached = least.values(y[:-1])
         k = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]
         heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
-        if len(heads) <= _TOGETHER:
+        if len(heads) <= _MANY_RUNS:
             break
         _follow_runs(y, least, first, heads, top)
     end = 0
@@ -136,7 +136,7 @@ def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> 
         steps.append((run, k, current))
         inside = k < end
         k, current, run = k[inside], current[inside], run[inside]
-        if len(steps) > _LONGEST and len(k) <= _TOGETHER:  # these are followed one by one
+        if len(steps) > _MAX_STEPS and len(k) <= _MANY_RUNS:  # these are followed one by one
             ends[run] = k
             break
     end_of_last, written = 0, np.zeros(len(heads), bool)
@@ -158,7 +158,7 @@ def _functions_by_interval(least: Least, intervals: slice) -> dict[int, list[tup
 
 def _follow_run(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
     """Put right y[k+1], ... up to some place where it is what comes there, and return that."""
-    current, size = float(y[k]), _FEWEST
+    current, size = float(y[k]), _MIN_INTERVALS
     while True:
         end = min(k + size, len(y) - 1)
         tops, last, values = most[k + 1 : end + 1].tolist(), y[end], []
@@ -179,4 +179,4 @@ def _follow_run(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
         y[k + 1 : end + 1] = values
         if current == last or end == len(y) - 1:
             return end
-        k, size = end, min(2 * size, _MOST)
+        k, size = end, min(2 * size, _MAX_INTERVALS)

@@ -28,12 +28,12 @@ from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, interval_par
 
 _NEIGHBOURS = 5  # samples that give a slope
 _SECTIONS = 16  # sections of samples between breaks from which on they are worked on together
-_MOST = 1e18  # bound of x where nothing bounds it
+_UNBOUNDED = 1e18  # bound of x where nothing bounds it
 _EXCESS = 1.001  # factor, at most, on an acceleration, or on a speed squared, between grid points
-_LITTLE = 1.0002  # factor up to which an excess is left as it is: most of the others are above 1 by rounding
+_SMALL_EXCESS = 1.0002  # factor up to which an excess is left as it is: most of the others are above 1 by rounding
 _ROUNDS = 8  # rounds, at most, in which excesses are taken away
 _SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
-_FEW = 400  # samples of a way up to which the law needs more grid points
+_FEW_SAMPLES = 400  # samples of a way up to which the law needs more grid points
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def refine_knots(path: Knots) -> Knots:
 
     With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
     """
-    if len(path.s) >= _FEW or len(path.rests):
+    if len(path.s) >= _FEW_SAMPLES or len(path.rests):
         return path
     parts = max(2, round(200 / len(path.s)))
     h, f = path.h[:, None], (np.arange(parts) / parts)[:, None, None]
@@ -138,7 +138,7 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
     down for, from rest to rest.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        cap = np.minimum(bounds.cap, _MOST)
+        cap = np.minimum(bounds.cap, _UNBOUNDED)
         speed = np.broadcast_to(bounds.speed, path.q.shape)
         for points in interval_parts(len(cap)):
             rate = np.ascontiguousarray((speed[points] / np.maximum(np.abs(path.d[points]), TINY)).T).min(axis=0)
@@ -155,10 +155,10 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
             if worst.max() <= _EXCESS:
                 return law.x
             if round_ < _ROUNDS - 1:
-                bad, x = np.flatnonzero(worst > _LITTLE), law.x
+                bad, x = np.flatnonzero(worst > _SMALL_EXCESS), law.x
                 law.lower_speeds(_add_neighbours(bad, len(worst)))
                 gone = law.x != x
-                moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _LITTLE))
+                moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _SMALL_EXCESS))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
         slower = np.maximum(np.maximum.reduceat(worst, begins), 1.0)
         return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
@@ -171,9 +171,9 @@ def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, sha
     rush = motion.squared_speed_shares(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
     worst = np.maximum(over.max(axis=0), rush)
     if share:
-        law.share[:, intervals] /= np.where(over > _LITTLE, over, 1.0)
+        law.share[:, intervals] /= np.where(over > _SMALL_EXCESS, over, 1.0)
     less = rush if share else worst
-    low = np.flatnonzero(less > _LITTLE)
+    low = np.flatnonzero(less > _SMALL_EXCESS)
     for points, x in ((intervals[low], x0[low]), (intervals[low] + 1, x1[low])):
         np.fmin.at(law.cap, points, x / less[low])
     return np.asarray(worst)

@@ -23,7 +23,7 @@ from armkin.motion.timing.profile import Profile
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LONGEST = 86_400  # length [s], at most, of a trajectory: a day
+MAX_SECONDS = 86_400  # length [s], at most, of a trajectory: a day
 BRAKE = 0.625  # share of the motors' accelerations with which a board stops on a curve
 
 
@@ -103,9 +103,9 @@ class Trajectory:
     stretches: tuple[Stretch, ...]
 
     def __post_init__(self) -> None:
-        if not self.duration <= LONGEST:
+        if not self.duration <= MAX_SECONDS:
             raise UsageError(
-                f"the motion takes {self.duration:.6g} s; one plan lasts a day ({LONGEST} s) at most: "
+                f"the motion takes {self.duration:.6g} s; one plan lasts a day ({MAX_SECONDS} s) at most: "
                 "go faster, or in parts"
             )
 

@@ -10,8 +10,8 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 
 CORNER = np.deg2rad(20.0)  # angle [rad] of a turn, above which it is rounded
-SHORT = 1 / 3  # share of a chord: a shorter neighbour tells nothing of its curvature
-_SAME = 1e-6  # distance [mm] of points that are one
+SHORT_SHARE = 1 / 3  # share of a chord: a shorter neighbour tells nothing of its curvature
+_SAME_POINT = 1e-6  # distance [mm] of points that are one
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Chords:
         for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             half = np.minimum(0.5 * L[chord] * bend, 1.0)
             rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
-            tells = (turned <= CORNER) & (L[neighbour] >= SHORT * L[chord])
+            tells = (turned <= CORNER) & (L[neighbour] >= SHORT_SHARE * L[chord])
             rise_of_chord[chord] = np.maximum(rise_of_chord[chord], np.where(tells, rise, 0.0))
         return rise_of_chord
 
@@ -67,5 +67,5 @@ def turn_angles(y: Array) -> Array:
 
 def distinct_points(y: Array) -> Int:
     """Numbers of the points (N, d) that are not the same as the one before; the last one stays."""
-    apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME
+    apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME_POINT
     return np.flatnonzero(np.append(True, apart))

@@ -20,8 +20,8 @@ from armkin.motion.tool_path.least_knots import Rows, least_knots
 
 REVERSAL = np.deg2rad(160.0)  # turn [rad] from which on a corner is a stop
 _SCALES = (4.0, 16.0)  # distances [tolerances] from which a corner is still one, and a recorder's noise is none
-_ALIKE = 0.1  # difference [rad] of turns that are the same
-_BETWEEN = 6  # places of each cubic that are held to its chords in the end
+_SAME_TURN = 0.1  # difference [rad] of turns that are the same
+_INNER_PLACES = 6  # places of each cubic that are held to its chords in the end
 _TRIES = 5  # tries after which a curve that leaves its chords is given up
 
 
@@ -69,7 +69,7 @@ def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
             np.stack([np.interp(places, u, y[:, k]) for k in range(y.shape[1])], axis=1) for places in (before, after)
         ]
         far = turn_angles(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
-        alike = (alike & (np.abs(far - near[sharp - 1]) < _ALIKE))[far > CORNER]
+        alike = (alike & (np.abs(far - near[sharp - 1]) < _SAME_TURN))[far > CORNER]
         sharp, sure = sharp[far > CORNER], sure[far > CORNER]
     # beside chords too short to tell a direction one that is not as sharp from near as from afar is a tight bend and
     # noise, if a curve passes it
@@ -156,7 +156,7 @@ def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
 
 def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:
     """Chords that a cubic leaves between the places that it was fitted to: their numbers."""
-    f = (np.arange(_BETWEEN) + 0.5)[:, None] / _BETWEEN
+    f = (np.arange(_INNER_PLACES) + 0.5)[:, None] / _INNER_PLACES
     k = np.flatnonzero(used)
     u = np.append(layout.begin + f * (layout.end - layout.begin), chords.u[k] + f * chords.length[k])
     i = np.searchsorted(layout.begin, u, side="right") - 1

@@ -8,17 +8,17 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout, least_squares
-from armkin.motion.tool_path.chords import SHORT, Chords
+from armkin.motion.tool_path.chords import SHORT_SHARE, Chords
 
 _CHORD = 0.85  # A curve beside chords is allowed this share of the tolerance.
-_EVEN = 8  # A chord that is long beside a neighbour is divided into so many parts.
+_EVEN_PARTS = 8  # A chord that is long beside a neighbour is divided into so many parts.
 _SPARE = 0.98  # A fit is held to this share of the allowed misfit, so that rounding stays within it.
-_POINTS, _LONGEST = 32, 20.0  # A first interval has at most so many points and so many mm.
+_POINTS, _MAX_LENGTH = 32, 20.0  # A first interval has at most so many points and so many mm.
 _ROUNDS = 80  # The intervals are divided in at most so many rounds.
-_TELLING, _CLOSE = 5, 0.05  # So many points tell misfit from noise; this share of the allowed misfit is none.
+_MIN_COUNT, _NOISE = 5, 0.05  # So many points tell misfit from noise; this share of what is allowed is none.
 _PATIENCE = 4  # Points are weighed in so many rounds before an interval is divided.
-_HEAVIEST = 1e6  # A point has at most this weight.
-_HOPELESS = 2.5  # A misfit of so many times what is allowed needs a division: weights do not help.
+_MAX_WEIGHT = 1e6  # A point has at most this weight.
+_HOPELESS_MISFIT = 2.5  # A misfit of so many times what is allowed needs a division: weights do not help.
 
 
 @dataclass(frozen=True)
@@ -104,12 +104,12 @@ def _graded_places(chords: Chords, used: Bool) -> tuple[Int, Array]:
     same_next = np.append(same[1:], False)
     left = np.where(same, np.append(np.inf, L[:-1]), np.inf)
     right = np.where(same_next, np.append(L[1:], np.inf), np.inf)
-    alone = np.flatnonzero(np.minimum(left, right) < SHORT * L)
-    even = np.arange(1, _EVEN) / _EVEN
+    alone = np.flatnonzero(np.minimum(left, right) < SHORT_SHARE * L)
+    even = np.arange(1, _EVEN_PARTS) / _EVEN_PARTS
     numbers, places = [np.repeat(alone, len(even))], [np.tile(even, len(alone))]
     for neighbour, side in ((left, 0), (right, 1)):
         distance = neighbour
-        while (long := np.flatnonzero((neighbour < SHORT * L) & (distance < 0.45 * L))).size:
+        while (long := np.flatnonzero((neighbour < SHORT_SHARE * L) & (distance < 0.45 * L))).size:
             numbers.append(long)
             f = distance[long] / L[long]
             places.append(f if side == 0 else 1 - f)
@@ -121,7 +121,7 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     """Splines of few knots through rows: layout, control points, and how far they leave the rows (R,)."""
     first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
     inside = np.arange(len(rows.u)) - first[rows.curve]
-    block = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _LONGEST))
+    block = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _MAX_LENGTH))
     knot = rows.ends | np.append(False, np.diff(block) > 0)
     weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
     at_work, index = rows, np.arange(len(knot))
@@ -155,7 +155,7 @@ def _refine_intervals(
     begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
     knots = np.flatnonzero(knot)
     mine = knots[np.searchsorted(knots, begins[:-1])]
-    divide = astray | (worst > _HOPELESS) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
+    divide = astray | (worst > _HOPELESS_MISFIT) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
     age[mine[worst > 1.0]] += 1
     middle = (begins[:-1] + begins[1:]) // 2
     can = divide & (middle > begins[:-1]) & ~knot[middle]
@@ -164,7 +164,7 @@ def _refine_intervals(
     fresh = can[layout.interval]
     weight[fresh] = rows.weight[fresh]
     heavier = bad & ~fresh
-    weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * misses[heavier]) ** 2, _HEAVIEST)
+    weight[heavier] = np.minimum(np.maximum(weight[heavier], 0.05) * (1.4 * misses[heavier]) ** 2, _MAX_WEIGHT)
 
 
 def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
@@ -181,5 +181,5 @@ def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) ->
     counts = np.bincount(interval, minlength=M)
     weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
     return np.asarray(
-        ~weighed & (counts >= _TELLING) & (like > 0.5 * size) & (size > counts * (_CLOSE * rows.tolerance[0]) ** 2)
+        ~weighed & (counts >= _MIN_COUNT) & (like > 0.5 * size) & (size > counts * (_NOISE * rows.tolerance[0]) ** 2)
     )

@@ -24,11 +24,11 @@ from armkin.model.rotation import quaternion
 from armkin.motion.tool_path.b_spline import solve_banded
 
 PER_RADIAN = 30.0  # lever [mm/rad] at which a turn of the tool counts as a way
-SMALL = 1e-9  # length [mm] below which a piece is none
+MIN_LENGTH = 1e-9  # length [mm] below which a piece is none
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
 _TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
 _TABLES = 20_000  # intervals of all spans' tables
-_EVEN, _EXACT = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
+_EVEN_SLOPE, _LENGTH_ERROR = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
 
 
 def rotation_matrices(w: Array) -> Array:
@@ -213,7 +213,7 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
     spots = [a, *points]
     y = np.array([relative_values(task, a, s) for s in spots])
     chord = np.linalg.norm(np.diff(y * weights(task), axis=0), axis=1)
-    if chord.min() < SMALL:
+    if chord.min() < MIN_LENGTH:
         raise UsageError("a spline passes the same point twice in a row: leave one out")
     u = np.concatenate([[0.0], np.cumsum(np.sqrt(chord))])
     coefficients = _natural_spline(u, y)
@@ -338,8 +338,8 @@ def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale:
     slopes = (curve(v.ravel())[1] * scale).reshape(*v.shape, -1)
     most = np.abs(slopes).max(axis=(1, 2))
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
-    needed = np.ceil((length / _EXACT) ** 0.25)  # Hermite's error falls with the fourth power
-    even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN * most
+    needed = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
+    even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * most
     return np.where(even, 1, np.clip(needed, _LEAST_TABLE, _table_intervals(len(u) - 1))).astype(np.intp)
 
 

@@ -13,10 +13,10 @@ from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.timing.trajectory import group_numbers
 from armkin.motion.tool_path.fit_points import REVERSAL
-from armkin.motion.tool_path.path_pieces import SMALL, Dense, Piece, blend
+from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Dense, Piece, blend
 
-_SAME = 1e-6  # distance [mm] of breaks that are one
-_SMOOTH = 1e-3  # angle [rad] between two directions that count as one
+_ONE_BREAK = 1e-6  # distance [mm] of breaks that are one
+_SMOOTH_ANGLE = 1e-3  # angle [rad] between two directions that count as one
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Route:
         if not inside:
             return self.ends
         breaks = np.sort(np.concatenate([self.ends, *inside]))
-        apart = np.append(True, np.diff(breaks) > _SAME)  # blends that take half of a side each meet in its middle
+        apart = np.append(True, np.diff(breaks) > _ONE_BREAK)  # blends that take half of a side each meet in its middle
         breaks = breaks[apart]
         breaks[-1] = self.length
         return np.asarray(breaks)
@@ -164,7 +164,7 @@ def join_pieces(
         if k in pauses:
             order[k] = len(made)
             rests.add(len(made))
-        if piece.length < SMALL:
+        if piece.length < MIN_LENGTH:
             continue
         if not made or len(made) in rests:
             stops.add(len(made))
@@ -173,7 +173,7 @@ def join_pieces(
             continue
         before, wish = made[-1], blends[k - 1]
         angle = _corner_angle(before, piece)
-        if angle < _SMOOTH:
+        if angle < _SMOOTH_ANGLE:
             made.append(piece)
         elif (radius := _blend_radius(before, piece, angle, wish, tolerance)) <= 0:
             stops.add(len(made))
@@ -184,7 +184,7 @@ def join_pieces(
                 middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
             else:
                 reduced.note(wish, radius_kept)
-            made[-1:] = [p for p in (first, middle, last) if p is last or p.length > SMALL]
+            made[-1:] = [p for p in (first, middle, last) if p is last or p.length > MIN_LENGTH]
         side = piece.length
     stops.add(len(made))
     return Route(task, tuple(made), frozenset(stops)), order
@@ -200,7 +200,7 @@ def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | N
     """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `join_pieces`'s blends."""
     # a cubic blend passes its corner at r |a - b| / 4
     radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
-    sharpest = REVERSAL if wish is None else np.pi - _SMOOTH
+    sharpest = REVERSAL if wish is None else np.pi - _SMOOTH_ANGLE
     return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 

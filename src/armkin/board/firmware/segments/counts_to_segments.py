@@ -18,7 +18,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.firmware.wire.protocol import BLOCK, COARSE, FINE, HALF, STEP, Segment, nearest_rate
+from armkin.board.firmware.wire.protocol import BLOCK, COARSE_UNIT, FINE_BOUND, HALF, STEP, Segment, nearest_rate
 
 Counts = NDArray[np.int64]
 
@@ -27,22 +27,22 @@ MIN_INTERVAL = 576  # interval [cycles] between ticks that every board makes
 
 _TICK, _TICK_QUICK = 1.12, 1.28  # shortest length of a tick at a segment's fast end, in intervals that the board makes
 _TICK_S = 20e-6  # length [s] of a tick, at least, unless a motor steps faster: no edge is farther off than that
-_COARSEST = 55e-6  # length [s] of a tick where a finer one would not fit the rates as well
+_MAX_TICK_S = 55e-6  # length [s] of a tick where a finer one would not fit the rates as well
 _ACCEL = 1.014  # factor on its acceleration that a piece has at most; above it its ends' speeds come nearer
-_LESS = 0.975  # factor, at least, on that difference of speeds: the jump is a few cycles of the interval between pieces
-_STEADY = 0.004  # relative change of speed that counts as none
-_EVEN = 0.02  # length [s] of a piece of one speed whose intervals grow bit by bit: in less the change is too great
-_FINE = 150  # ticks in which the fastest motor makes a step: more would not be smoother
+_MIN_FACTOR = 0.975  # factor, at least, on that difference of speeds: a few cycles of the interval between pieces
+_STEADY_CHANGE = 0.004  # relative change of speed that counts as none
+_EVEN_SECONDS = 0.02  # length [s] of a piece of one speed whose intervals grow bit by bit: less changes too fast
+_FINE_TICKS = 150  # ticks in which the fastest motor makes a step: more would not be smoother
 _DRIFT = 0.02  # error [steps], at most, that adds up
-_WHOLE = 8  # ticks a step, up to which a ramp's are as many for each step: a tick is felt
-_SLOW = 40  # ticks a step, from where on the ticks need not fit the steps
-_FEWEST = 32  # ticks of a segment, at least, where the board can make them
-_LONGEST = 50_000  # interval [cycles], at most, of a tick; the device takes 65535
-_QUICK = 1000, 20  # ticks, at most, of a segment whose `bend` counts with each; least such bend
+_WHOLE_TICKS = 8  # ticks a step, up to which a ramp's are as many for each step: a tick is felt
+_LONG_STEP = 40  # ticks a step, from where on the ticks need not fit the steps
+_MIN_TICKS = 32  # ticks of a segment, at least, where the board can make them
+_MAX_INTERVAL = 50_000  # interval [cycles], at most, of a tick; the device takes 65535
+_BENDS = 1000, 20  # ticks, at most, of a segment whose `bend` counts with each; least such bend
 _BEND = 32767  # greatest bend of a segment
 _MONOTONE = 1.98  # ratio of a parabola's slow end to its fast one, in distances from the mean: from 2 on it turns
 _CHOICE, _CHOICES = 32, 12  # ticks of a ramp of which one may be left out, for intervals of whole cycles; at most
-_MOST = 16_000  # ticks, at most, of a segment: as many as a rate is exact for to a quarter of a step
+_MAX_TICKS = 16_000  # ticks, at most, of a segment: as many as a rate is exact for to a quarter of a step
 
 
 class Segments(Protocol):
@@ -114,8 +114,10 @@ class Cutter:
         exact = seconds * self.clock + self.late
         if unheard:
             ticks = self._tick_count(exact, steps)
-            segment = Segment(ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE) * COARSE for x in ways))
-        elif abs(change) < _STEADY:
+            segment = Segment(
+                ticks, round(exact / ticks), 0, tuple(round(x / ticks / COARSE_UNIT) * COARSE_UNIT for x in ways)
+            )
+        elif abs(change) < _STEADY_CHANGE:
             segment = self._steady_segment(exact, ways, steps, drift)
         else:
             segment = self._ramp_segment(exact, ways, steps, change)
@@ -143,10 +145,10 @@ class Cutter:
     def _steady_segment(self, exact: float, remainders: Sequence[int], steps: float, drift: float) -> Segment:
         """One speed for `exact` cycles; remainders: (motors,) 2^-23 step, steps: of the fastest."""
         ticks = self._tick_count(exact, steps)
-        if ticks > _SLOW * steps or _rounding_drift(ticks, remainders) > drift:
+        if ticks > _LONG_STEP * steps or _rounding_drift(ticks, remainders) > drift:
             ticks = _exact_ticks(ticks, remainders)
         interval, add = round(exact / ticks), 0
-        if ticks > 1 and exact > _EVEN * self.clock:
+        if ticks > 1 and exact > _EVEN_SECONDS * self.clock:
             interval, add = _evenly_spread(exact, ticks)
         return Segment(ticks, interval, add, _rounded_rates(remainders, ticks))
 
@@ -156,17 +158,17 @@ class Cutter:
         shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
         ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
         quick = (
-            steps <= ticks <= _QUICK[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _QUICK[1]
+            steps <= ticks <= _BENDS[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _BENDS[1]
         )
         if not quick:
-            fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MOST))
-            if ticks > 1 and steps <= _QUICK[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
-                quick, ticks = True, _QUICK[0]  # else it would end faster than the board loads the next one
-        ticks = max(1, ticks, math.ceil(steps), math.ceil(exact / _LONGEST))
+            fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MAX_TICKS))
+            if ticks > 1 and steps <= _BENDS[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
+                quick, ticks = True, _BENDS[0]  # else it would end faster than the board loads the next one
+        ticks = max(1, ticks, math.ceil(steps), math.ceil(exact / _MAX_INTERVAL))
         ratio = (2 + abs(change)) / (2 - abs(change))
         above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
-        change *= max(_LESS, min(1.0, _ACCEL / (1 + above)))
-        if steps >= 4 and (over := int(ticks / steps)) <= _WHOLE:
+        change *= max(_MIN_FACTOR, min(1.0, _ACCEL / (1 + above)))
+        if steps >= 4 and (over := int(ticks / steps)) <= _WHOLE_TICKS:
             ticks = max(round(over * steps), math.ceil(steps))
         elif ticks > _CHOICE:
             spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
@@ -180,14 +182,14 @@ class Cutter:
         """How many ticks a piece of one speed has: whole ones for each step of its fastest motor, if it makes many."""
         least = max(_TICK * self.min_interval, _TICK_S * self.clock)
         step_cycles = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
-        tick = max(least, min(step_cycles / _FINE, cycles / _FEWEST, _LONGEST / 2), cycles / _MOST)
+        tick = max(least, min(step_cycles / _FINE_TICKS, cycles / _MIN_TICKS, _MAX_INTERVAL / 2), cycles / _MAX_TICKS)
         over = int(step_cycles / tick) if step_cycles < math.inf else 0
-        if 1 <= over <= _FINE:
-            exact = over if over > _SLOW else 1 << over.bit_length() - 1  # a power of two: a rate without rounding
-            tick = step_cycles / (exact if step_cycles / exact <= _COARSEST * self.clock else over)
+        if 1 <= over <= _FINE_TICKS:
+            exact = over if over > _LONG_STEP else 1 << over.bit_length() - 1  # a power of two: a rate without rounding
+            tick = step_cycles / (exact if step_cycles / exact <= _MAX_TICK_S * self.clock else over)
         elif over == 0 and step_cycles < math.inf:
             tick = step_cycles
-        return max(1, math.ceil(cycles / _LONGEST), round(cycles / tick))
+        return max(1, math.ceil(cycles / _MAX_INTERVAL), round(cycles / tick))
 
 
 def _rounded_rates(remainders: Sequence[int], ticks: int) -> tuple[int, ...]:
@@ -207,7 +209,7 @@ def _exact_ticks(ticks: int, remainders: Sequence[int]) -> int:
     """
     near = np.arange(ticks - ticks // 32, ticks + ticks // 32 + 1)
     exact = np.abs(np.array(remainders, dtype=float))[:, None] / near
-    rates = np.where(exact < FINE - 0.5, np.rint(exact), np.rint(exact / COARSE) * COARSE)
+    rates = np.where(exact < FINE_BOUND - 0.5, np.rint(exact), np.rint(exact / COARSE_UNIT) * COARSE_UNIT)
     drift = np.abs(exact - rates) * near
     return int(near[drift.max(axis=0).argmin()])
 

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Stretch
 
-_LEAST, _MOST = 0.010, 0.050  # length [s] of a segment, at least and at most
+_MIN_SECONDS, _MAX_SECONDS = 0.010, 0.050  # length [s] of a segment, at least and at most
 _GROWTH = 0.12  # length of a segment, at most, as a share of the time since the start, or to the end
-_FINE = 0.005  # time [s] between the samples from which the spans are chosen
+_SAMPLE_PERIOD = 0.005  # time [s] between the samples from which the spans are chosen
 _QUEUED = 25  # segments that are surely in the board's queue
 _SETTLING = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
 _JUMP = 1.1  # factor on the motors' accelerations that a segment has at most
@@ -143,7 +143,7 @@ class CurveSegments:
     def bounds(self) -> Array:
         """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
         duration = self.stretch.duration
-        t = np.linspace(0.0, duration, max(int(duration / _FINE), 16))
+        t = np.linspace(0.0, duration, max(int(duration / _SAMPLE_PERIOD), 16))
         level = self._density(t)  # segments a second, then segments since the beginning
         level[1:] += level[:-1].copy()
         level[0] = 0.0
@@ -164,7 +164,7 @@ class CurveSegments:
             span, stop = self._span_limits(part)
             span = np.minimum(span, _GROWTH * np.minimum(part, duration - part))
             stop_times = np.concatenate([behind, stop])
-            span = np.maximum(np.clip(span, _LEAST, _MOST), _least_spans(stop_times, step)[len(behind) :])
+            span = np.maximum(np.clip(span, _MIN_SECONDS, _MAX_SECONDS), _least_spans(stop_times, step)[len(behind) :])
             density[first : first + len(part)] = 1.0 / span
             first += len(part)
             behind = stop_times[-int(stop_times.max() / step) - 1 :]
@@ -179,7 +179,7 @@ class CurveSegments:
         arm, qd, qdd = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
         stop = (np.abs(qd @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
         lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
-        tight = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MOST**2)
+        tight = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
         J = jacobian(arm, self.stretch.evaluate(t[tight]))[:, :3]
         v, bend = ((J @ x[tight, :, None])[..., 0] for x in (qd, qdd))
         along = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
@@ -196,7 +196,7 @@ def _least_spans(stop: Array, step: float) -> Array:
     """
     need = stop / _QUEUED
     least = need.copy()
-    if float(need.max(initial=0.0)) <= _LEAST:  # no segment is shorter
+    if float(need.max(initial=0.0)) <= _MIN_SECONDS:  # no segment is shorter
         return least
     for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
         least[d:] = np.maximum(least[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
@@ -205,7 +205,7 @@ def _least_spans(stop: Array, step: float) -> Array:
 
 def sampled_rates(arm: Arm, stretch: Stretch) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
-    t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _FINE), 16))
+    t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _SAMPLE_PERIOD), 16))
     parts = np.array_split(t, max(len(t) // _SAMPLES, 1))
     return np.asarray(
         np.max([np.abs(stretch.evaluate(part, 1) @ arm.motor_gain.T).max(axis=0) for part in parts], axis=0)

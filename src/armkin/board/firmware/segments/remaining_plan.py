@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
     from armkin.formula.arrays import Array
 
-_NEAR = 1.5  # distance [steps] of a plan that every motor of an arm on it keeps within
+_PLAN_DISTANCE = 1.5  # distance [steps] of a plan that every motor of an arm on it keeps within
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
             stretch = part.trajectory.stretches[k]
             begin = before + float(part.trajectory.begins[k])
             if not segments:
-                if np.abs(move.start - counts).max(initial=0) <= _NEAR:
+                if np.abs(move.start - counts).max(initial=0) <= _PLAN_DISTANCE:
                     yield Place(p, k, 0.0, begin)
                 continue
             steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
@@ -74,7 +74,7 @@ def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
             for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
                 way = b - a
                 share = float(np.clip((counts - a) @ way / max(way @ way, 1e-12), 0.0, 1.0))
-                if np.abs(a + share * way - counts).max(initial=0) <= _NEAR:
+                if np.abs(a + share * way - counts).max(initial=0) <= _PLAN_DISTANCE:
                     time = _refine_time(part, k, t0 + share * (t1 - t0), counts)
                     yield Place(p, k, time, begin + time)
         before += part.duration

@@ -30,8 +30,8 @@ from armkin.motion.timing.profile import Profile, trapezoid
 # A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right
 # to 0.53 (ratio - 1)^2, 1.5 % at 1.17. All of a ramp fits into the board's queue (32).
 _RATIO = 1.14  # ratio of speeds of a segment in a ramp with fewer segments than `_RAMP`
-_RAMP, _SHORT, _ROUGH = 27, 13, 12  # segments of a ramp at most, see `Pieces`
-_WIDEST = 1.4  # ratio of speeds from which the first segment gets longer: the board takes 5/4 of the acceleration
+_RAMP, _SHORT_RAMP, _ROUGH_RAMP = 27, 13, 12  # segments of a ramp at most, see `Pieces`
+_MAX_RATIO = 1.4  # ratio of speeds from which the first segment gets longer: the board takes 5/4 of the acceleration
 _FIRST, _FIRST_ROUGH = 0.003, 0.03  # length [s], at least, of a ramp's first segment; in rough, four times any other
 _FIRST_MOST = 0.1  # length [s], at most, of a ramp's first segment: a board's jump is 5/4 of the acceleration in 50 ms
 _BEFORE_STEP = 0.96  # share of the time to a motor's first step: until then no motor tells how it got there
@@ -45,7 +45,7 @@ _SPLIT = 0.08  # length [s] of a cruise segment whose end is one of its own
 _NONE = (0.03, 0.0006)  # length of a cruise, as a share of a ramp or in [s], below which it belongs to the ramps
 _MAKE_UP = 0.01  # share of its way in a piece that a motor makes up for: the board takes 1.05 of its rate
 _SPARE = 0.0005  # share of a piece's steps that is left for the next one to make up for
-_EAGER = 2000  # segments of a line that are made at once
+_EAGER_SEGMENTS = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
 
 
@@ -74,7 +74,7 @@ def line_segments(
     if not (last - first).any():
         return Move(first, last, (), 0)
     line = LineSegments(first, last, law, clock, min_interval, pieces)
-    if len(line) > _EAGER:
+    if len(line) > _EAGER_SEGMENTS:
         return Move(first, last, line, round(law.duration * clock))
     made = tuple(line)
     return Move(first, last, made, sum(map(cycles_of, made)))
@@ -142,9 +142,9 @@ def straight_line(
 def _most_ramp_segments(law: Profile, pieces: Pieces) -> int:
     """Segments of a ramp at most; a move is short if its cruise is shorter than a ramp."""
     if pieces == Pieces.ROUGH:
-        return _ROUGH
+        return _ROUGH_RAMP
     short = law.is_trapezoid and law.duration < 3 * law.peak / law.accel
-    return _SHORT if short and pieces == Pieces.FEW else _RAMP
+    return _SHORT_RAMP if short and pieces == Pieces.FEW else _RAMP
 
 
 def _to_first_step(law: Profile, accel: float, steps: int) -> float:
@@ -198,7 +198,7 @@ def _ramp_bounds(law: Profile, t0: float, t1: float, accel: float, steps: int, p
     most, shortest = _most_ramp_segments(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
     top = max(v0, v1) / abs(accel)  # [s] from rest at each speed
     first = max(min(v0, v1) / abs(accel), shortest, _to_first_step(law, accel, steps))
-    first = min(max(first, top / _WIDEST**most), _FIRST_MOST)
+    first = min(max(first, top / _MAX_RATIO**most), _FIRST_MOST)
     to_rest = [top]
     if top > first:
         number = min(most, math.ceil(math.log(top / first) / math.log(_RATIO)))

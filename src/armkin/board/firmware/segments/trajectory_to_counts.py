@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 TOLERANCE = 0.05  # distance [mm] between the chord of a segment and its curve
 
 
-FARTHEST = 2**30  # position [counts], at most: half of what a board's registers hold
+MAX_COUNTS = 2**30  # position [counts], at most: half of what a board's registers hold
 
 
 class RateError(UsageError):
@@ -105,9 +105,9 @@ def cut_trajectory(
     arm, first = trajectory.arm, np.asarray(start, dtype=np.int64)
     ends = [pulses(arm, stretch.end) for stretch in trajectory.stretches]
     for end in ends:
-        if (far := int(np.abs(end).argmax())) >= 0 and abs(end[far]) > FARTHEST:
+        if (far := int(np.abs(end).argmax())) >= 0 and abs(end[far]) > MAX_COUNTS:
             raise UsageError(
-                f"motor {motor_names(arm)[far]} would stand at {end[far]:,} counts; a board counts to {FARTHEST:,}"
+                f"motor {motor_names(arm)[far]} would stand at {end[far]:,} counts; a board counts to {MAX_COUNTS:,}"
             )
     top = np.zeros(len(first))
     begin, allowed = first, clock / min_interval

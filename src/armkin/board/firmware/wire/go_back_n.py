@@ -17,8 +17,8 @@ from armkin.board.firmware.wire.serial_line import Line
 
 _RESEND = 0.03  # time [s] without progress, beyond the time of the slowest answer, after which frames are sent again
 _GAP = 0.004  # time [s] after all that was sent has left and an answer had its time
-_LATE = 0.012  # time [s] without progress before a question is to find out
-_EAGER = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
+_ASK_AFTER = 0.012  # time [s] without progress before a question is to find out
+_NOISY_RESEND = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 1, 16  # frames under way, on a bad line, where what follows a lost one is for nothing, and on a good one
 _BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
 QUESTION = 12  # size [bytes] of a STATUS? on the line
@@ -87,7 +87,7 @@ class Window:
         begun = self._line.port.now()
         self._fill()
         beyond_slowest = _GAP if self._gap else _RESEND
-        patience = _EAGER if self._line.noisy else self._line.slowest + beyond_slowest
+        patience = _NOISY_RESEND if self._line.noisy else self._line.slowest + beyond_slowest
         if self._sent and begun - self._line.clear > patience:
             self._go_back(0, len(self._sent[0][1]))
         elif self._gap and not self._line.noisy and begun > self._deaf:
@@ -99,7 +99,7 @@ class Window:
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        patience = self._line.slowest + (_GAP if self._line.damaged else _LATE)
+        patience = self._line.slowest + (_GAP if self._line.damaged else _ASK_AFTER)
         return bool(self._sent) and self._line.port.now() - self._line.clear > patience
 
     def _room(self, size: int, first: int) -> int:

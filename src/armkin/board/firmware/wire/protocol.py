@@ -23,8 +23,8 @@ from armkin.board.firmware.wire.framing import cobs_encode as cobs_encode
 from armkin.board.firmware.wire.framing import decode_frame as decode_frame
 from armkin.board.firmware.wire.framing import encode_frame as encode_frame
 from armkin.board.firmware.wire.segment_format import BLOCK as BLOCK
-from armkin.board.firmware.wire.segment_format import COARSE as COARSE
-from armkin.board.firmware.wire.segment_format import FINE as FINE
+from armkin.board.firmware.wire.segment_format import COARSE_UNIT as COARSE_UNIT
+from armkin.board.firmware.wire.segment_format import FINE_BOUND as FINE_BOUND
 from armkin.board.firmware.wire.segment_format import HALF as HALF
 from armkin.board.firmware.wire.segment_format import STEP as STEP
 from armkin.board.firmware.wire.segment_format import Segment as Segment

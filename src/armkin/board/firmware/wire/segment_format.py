@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 STEP = 1 << 23  # units of a rate and of a place in one step
 HALF = STEP // 2  # place of an axis at rest, above its count
-COARSE = 1 << 8  # unit of rates from 2^-8 step a tick on, in units of a rate
-FINE = 1 << 15  # bound of smaller rates, which are sent in units of 1
+COARSE_UNIT = 1 << 8  # unit of rates from 2^-8 step a tick on, in units of a rate
+FINE_BOUND = 1 << 15  # bound of smaller rates, which are sent in units of 1
 _FULL = STEP - 128  # greatest rate: a step a tick, but for 2^-16
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
@@ -19,7 +19,7 @@ BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 class Segment:
     """T ticks, the first after `interval` cycles; a rate per axis.
 
-    rates: 2^-23 steps a tick, signed; from 2^-8 step on multiples of `COARSE`, or STEP - 128. An axis at place P
+    rates: 2^-23 steps a tick, signed; from 2^-8 step on multiples of `COARSE_UNIT`, or STEP - 128. An axis at place P
     is at P + T x rate afterwards, and its count is P >> 23. The interval grows by `add` [2^-16 cycles] with each
     tick, and `add` by `bend`: 2^-22 cycles with every 16th, counted from the end, or quick: 2^-17 with each.
     """
@@ -63,7 +63,7 @@ class Segment:
     @property
     def narrow(self) -> bool:
         """True if it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
-        coarse = all(r % COARSE == 0 or abs(r) == _FULL for r in self.rates)
+        coarse = all(r % COARSE_UNIT == 0 or abs(r) == _FULL for r in self.rates)
         return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
 
     @property
@@ -78,24 +78,24 @@ class Segment:
 
 def nearest_rate(exact: float) -> int:
     """The rate nearest to one in 2^-23 steps a tick that a wide segment can say."""
-    if abs(exact) < FINE - 0.5:
+    if abs(exact) < FINE_BOUND - 0.5:
         return round(exact)
     return _coarse_rate(exact)
 
 
 def _coarse_rate(exact: float) -> int:
-    rate = round(exact / COARSE)
-    return rate * COARSE if abs(rate) < FINE - 1 else int(math.copysign(_FULL, rate))
+    rate = round(exact / COARSE_UNIT)
+    return rate * COARSE_UNIT if abs(rate) < FINE_BOUND - 1 else int(math.copysign(_FULL, rate))
 
 
 def _sent_rate(rate: int) -> int:
     """A coarse rate as it is sent."""
-    return int(rate / COARSE)
+    return int(rate / COARSE_UNIT)
 
 
 def _full_rate(short: int) -> int:
     """And back."""
-    return short * COARSE if abs(short) != FINE - 1 else int(math.copysign(_FULL, short))
+    return short * COARSE_UNIT if abs(short) != FINE_BOUND - 1 else int(math.copysign(_FULL, short))
 
 
 def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
@@ -116,8 +116,8 @@ def pack_segment(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     """A segment's bytes; bit i of the wide form's `fine` is axis i, bit 15 `quick`."""
     if not wide:
         return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_sent_rate, s.rates))
-    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE]
-    short = (r if abs(r) < FINE else _sent_rate(r) for r in s.rates)
+    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE_BOUND]
+    short = (r if abs(r) < FINE_BOUND else _sent_rate(r) for r in s.rates)
     head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
     return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine) | s.quick << 15, *short)
 
@@ -134,6 +134,6 @@ def read_segment(raw: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
         return Segment(ticks, interval, add * 256, tuple(map(_full_rate, short)))
     ticks, interval = struct.unpack_from("<HH", raw)
     bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", raw, 7)
-    rates = tuple(r if fine >> i & 1 and r != -FINE else _full_rate(r) for i, r in zip(axes, short, strict=True))
+    rates = tuple(r if fine >> i & 1 and r != -FINE_BOUND else _full_rate(r) for i, r in zip(axes, short, strict=True))
     add = int.from_bytes(raw[4:7], "little", signed=True)
     return Segment(ticks, interval, add, rates, bend, quick=bool(fine >> 15))

@@ -22,7 +22,7 @@ _ENDS = 50  # motion [ms] that the queue holds when its end is near
 _GIVE_UP = 1.5  # time [s] without any answer after which a board counts as gone
 _TURN = 0.1  # time [s] that one turn counts at most: a program that had to wait longer for its own turn was deaf
 _QUIET = 3.0  # time [s] of questions without an answer, of a board that was there
-_BEHIND = 16  # questions without an answer
+_UNANSWERED = 16  # questions without an answer
 _STALLED = 5.0  # time [s] beyond what all in the queue may take
 _HOLD = 15.0  # time [s] that an arm may take to come to rest
 _LISTENS = 0.2  # time [s] after the opening by which a Mega's boot loader listens
@@ -283,7 +283,7 @@ class Session:
 
 def _between_questions(line: Line, window: Window, ends: bool) -> float:
     """Seconds from one question for the status to the next; ends: the queue does."""
-    if line.unanswered > _BEHIND:  # more questions would fill the line, and be lost in front of the board
+    if line.unanswered > _UNANSWERED:  # more questions would fill the line, and be lost in front of the board
         return _POLL
     # There is room for one question beside the frames; on a bad line the one before may be lost.
     late = window.late and (line.damaged or not line.unanswered)
