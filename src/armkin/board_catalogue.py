@@ -26,8 +26,8 @@ class Board(NamedTuple):
     kind: str  # as `board: {kind: ...}` in a robot file
     number: int  # as INFO says it
     steppers: tuple[str, ...]  # names of its stepper axes, in the protocol's order
-    servos: tuple[str, ...]  # of its servo axes, which follow
-    switches: tuple[str, ...]  # of its limit inputs
+    servos: tuple[str, ...]  # names of its servo axes, which follow
+    switches: tuple[str, ...]  # names of its limit inputs
     queue: int  # segments
     frame: int  # [bytes] payload + CRC
     min_interval: int  # [cycles] between ticks

@@ -52,7 +52,7 @@ class _Step(NamedTuple):
     constant: Array | None
     axis: int = 2
     turns: bool = True
-    joint: int = -1  # of a joint's own motion
+    joint: int = -1  # number of the joint whose own motion it is
     parameter: int = -1
 
 

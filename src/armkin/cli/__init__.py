@@ -68,7 +68,7 @@ def _run_command_line() -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # of a terminal in ASCII or cp1252
+            stream.reconfigure(errors="backslashreplace")  # a terminal may be in ASCII or cp1252
     from armkin.cli.app import run
 
     return run(sys.argv[1:])

@@ -182,7 +182,7 @@ def _branch_table(
     """One line for each target, or branch of it, with numbers where there is a branch."""
     present, every = lines.has_branch, bool(lines.has_branch.all())
     mm, rad = _residuals(request, s, rows_of_part, lines)
-    names = tuple(name.replace(",", "") for name in s.names)  # so that `cut` sees one column
+    names = tuple(name.replace(",", "") for name in s.names)  # `cut` must see one column
     label = np.full(len(present), -1)
     label[present] = s.branch[rows_of_part][lines.target, lines.branch]
     table: Table = {

@@ -90,7 +90,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(BLOCK)  # its own criteria have been met
+            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(BLOCK)  # the elimination has met its own
         fields |= _task_fields(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"

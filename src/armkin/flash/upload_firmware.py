@@ -21,7 +21,7 @@ _LOADERS: dict[str, type[Stk500v1] | type[Stk500v2]] = {"atmega328p": Stk500v1, 
 _SIGNATURES = {
     bytes.fromhex("1e950f"): "atmega328p",
     bytes.fromhex("1e9514"): "atmega328p",  # the 328 without P, on some clones
-    bytes.fromhex("1e9516"): "atmega328p",  # and the PB
+    bytes.fromhex("1e9516"): "atmega328p",  # the 328PB
     bytes.fromhex("1e9801"): "atmega2560",
 }
 _LISTENS = 1.6  # time [s] after a reset in which a boot loader is asked for

@@ -56,7 +56,7 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
     def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
         if function is np.any:
             return True  # what is not known yet may be true of some pose
-        if function is np.flip:  # of a branch axis: what stands on the other branch
+        if function is np.flip:  # the flip of a branch axis is what stands on the other branch
             x, axis = inputs
             return x if axis >= len(x.axes) or x.axes[axis] == 1 else self.trace.record(f"flip_{axis}", (x,))
         if function is not np.where or len(inputs) != 3:
@@ -102,7 +102,7 @@ class Trace:
     def _combine_truths(self, op: str, x: Any, y: Any) -> Any:
         """``x & y`` or ``x | y``: without an operation where one of the two is known."""
         for constant, value in ((x, y), (y, x)):
-            if isinstance(constant, bool | np.bool_):  # of two constants
+            if isinstance(constant, bool | np.bool_):  # one argument is known: it decides, or the other does
                 return value if bool(constant) == (op == "bitwise_and") else bool(constant)
         return self.record(op, (x, y))
 

@@ -67,7 +67,7 @@ class Branch(NamedTuple):
     """One branch of one target, as joint values of the whole arm."""
 
     q: Array  # (n,) [rad | mm]
-    joints: list[float]  # the same in [deg | mm]
+    joints: list[float]  # values in [deg | mm]
     name: str
     within_limits: bool
     outside: list[int]  # indices of the joints outside their limits
@@ -76,7 +76,7 @@ class Branch(NamedTuple):
     motion: float  # sum of |change| from near [deg | mm]
     clearance: float | None = None  # [mm] where there are keep-outs that count
     hits: Sequence[Hit] = ()
-    interval: tuple[float, float] | None = None  # of the redundant joint [deg | mm], where there is one
+    interval: tuple[float, float] | None = None  # range of the redundant joint [deg | mm], where there is one
 
     @property
     def may_be_taken(self) -> bool:
@@ -96,8 +96,8 @@ class Answer(NamedTuple):
     best: int | None
     refused: str | None = None  # why no branch of the name asked for is the best one
     total: int = 0  # branches found; more than `branches` where not every one is kept
-    within_limits: int = 0  # of them
-    names: tuple[str, ...] = ()  # of all branches that the arm may have
+    within_limits: int = 0  # number of branches within limits
+    names: tuple[str, ...] = ()  # names of all branches that the arm may have
 
 
 def solve(request: Request, targets: Array, rounding: Array | None = None) -> list[Answer]:
@@ -300,11 +300,11 @@ class _SweptTarget:
 
     best: tuple[int, Answer] | None = None  # the best status, and the first answer with it
     names: dict[str, None] = field(default_factory=dict)  # in the order of coming
-    last: tuple[str, ...] = ()  # those of the answer before
+    last: tuple[str, ...] = ()  # names in the answer before
     free: set[str] = field(default_factory=set)
     total: int = 0
     legal: int = 0
-    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # and whether it is of the name asked for
+    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # branch, and whether it has the name asked for
 
     def add(self, status: int, answer: Answer, wanted_names: set[str]) -> None:
         """Take the answer for one combination of values in."""
@@ -364,7 +364,7 @@ def _refusal_reasons(request: Request, named: Sequence[Branch]) -> str:
     """What keeps the branches of the name asked for from being taken: they are outside limits, or hit something."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"
-    reasons: dict[str, str] = {}  # of several poses with one name, as of --sweep, the nearest
+    reasons: dict[str, str] = {}  # several poses may have one name, as with --sweep: the nearest counts
     for branch in named:
         if branch.within_limits and branch.hits:
             reasons.setdefault(branch.name, f"'{branch.name}' {hits_text(list(branch.hits))}")

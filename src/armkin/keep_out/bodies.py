@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
-    _Segment = tuple[int, Array, Array, bool]  # its body, where it begins and ends, whether it slides out
+    _Segment = tuple[int, Array, Array, bool]  # body, begin, end, and whether it slides out
 
 BASE = "base"  # name of the base's body
 ASSUMED = 0.02  # radius, as a share of the reach, of a body that the file does not state

@@ -30,7 +30,7 @@ class Pair(NamedTuple):
 
     body: int  # index of `Bodies.names`; of two bodies the later one
     other: int | None  # the other body; None: an obstacle
-    name: str  # of the other
+    name: str  # name of the other body
 
 
 @dataclass(frozen=True, eq=False)

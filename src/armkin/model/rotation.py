@@ -139,7 +139,7 @@ def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
     """`cos_sin_deg` of many; by the C library's functions of single numbers, as numpy's differ in the last bit."""
     turn = np.zeros(angles.shape, complex)
     turn.imag = angles * (math.pi / 180)
-    np.exp(turn, out=turn)  # of an imaginary number: the C library's cosine and sine
+    np.exp(turn, out=turn)  # an imaginary number's exp is the C library's cosine and sine
     cosine, sine = turn.real.copy(), turn.imag.copy()
     quarter = np.rint(angles / 90.0)
     exact = 90.0 * quarter == angles

@@ -59,9 +59,9 @@ class Pen:
     def __init__(self, placing: Placing) -> None:
         self.placing = placing
         self.moves: list[Move] = []
-        self.lines: list[int] = []  # of the file, where each move begins
-        self.points = 0  # that lines and arcs lead to
-        self._open: list[Sequence[float]] | None = None  # of the drawing: placed in the end
+        self.lines: list[int] = []  # lines of the file where each move begins
+        self.points = 0  # points that lines and arcs lead to
+        self._open: list[Sequence[float]] | None = None  # points of the drawing: placed in the end
         self._drawn: list[list[Sequence[float]]] = []
         self._speed: float | None = None
 

@@ -127,7 +127,7 @@ class Source:
 
     name: str
     lines: Mapping[tuple[str | int, ...], int]
-    rows: bool = False  # of CSV
+    rows: bool = False  # whether the moves are rows of CSV
     notes: tuple[str, ...] = ()  # what was read and ignored
 
 

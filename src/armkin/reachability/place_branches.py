@@ -29,7 +29,7 @@ def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
 
     s: answers to targets in their order (S, ...); free: (S, B) which hit nothing. Of limits nothing is said.
     """
-    number = s.branch  # the same along a path
+    number = s.branch  # a branch keeps its number along a path
     S, B, n = s.q.shape
     way = np.full((S, max(B, int(number.max(initial=-1)) + 1), n), np.nan)
     branch_there = s.valid & free & (number >= 0)

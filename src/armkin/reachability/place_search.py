@@ -113,7 +113,7 @@ class PositionChunk(NamedTuple):
     """Some positions (P, 2) [mm] of one arm."""
 
     number: int
-    question: int  # of the questions
+    question: int  # number of the question
     positions: Array
 
 
@@ -370,7 +370,7 @@ def _best_place(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[
     most = reached == reached.max()
     tied = np.argwhere(most & (margin >= margin[most].max() - 1e-9))
     if len(tied) > 1 and reached.max():
-        spread = tied[:: max(len(tied) // 200, 1)]  # of very many alike, some
+        spread = tied[:: max(len(tied) // 200, 1)]  # some of very many alike are enough
         tied = spread[int(np.argmax([room(*index) for index in spread.tolist()])) :]
     i, j, k = tied[0].tolist()
     return i, j, k

@@ -50,9 +50,9 @@ class PlaceQuestion(NamedTuple):
     step: float  # [rad] of the yaw
     z: float
     obstacles: Obstacles = Obstacles()
-    ways: tuple[int, ...] = ()  # of a path: how many targets each way has that one branch is to carry
+    ways: tuple[int, ...] = ()  # targets of each way of a path that one branch is to carry
     spare: str = ""  # the redundant joint, which a path's plan holds,
-    values: tuple[float, ...] = ()  # and where it may [rad], the best first
+    values: tuple[float, ...] = ()  # values [rad] where it may stand, the best first
     full_arm: HeldArm | None = None  # where one of the values is chosen
     solve: Solve = ik  # a function of a module, as it travels
 
@@ -330,7 +330,7 @@ def free_from(
     question: PlaceQuestion, position: Array, turn: float, legal_only: bool = True
 ) -> tuple[Solutions, NDArray[np.bool_]]:
     """The branches of all targets from one place, and which are free (N, B); legal_only: and within limits."""
-    # of a family every posture is an answer, but what one branch carries is another
+    # every posture of a family is an answer, but what one branch carries is another
     find = question.solve if legal_only else isolated_branches
     s = find(question.arm, targets_from(question, position, turn), question.task.name)
     legal = s.within_limits if legal_only else s.valid

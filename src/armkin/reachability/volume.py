@@ -81,7 +81,7 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     low, high = look.least - margin, look.most + margin
     if section.revolute:
         low[0] = max(low[0], 0.0)
-    side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # of cells finer than that most stay empty
+    side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # most cells finer than that stay empty
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else side)
     _fill_cells(cells, rng, _UNIFORM, _GROWN, chunk)
     levels = [cells]

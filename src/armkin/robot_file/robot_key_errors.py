@@ -125,7 +125,7 @@ def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
         if error["type"] == "problems":
             yield from error["ctx"]["problems"]
-        elif error["type"] == "errors":  # of a part that is validated by itself
+        elif error["type"] == "errors":  # a part that is validated by itself has such errors
             yield from problems(error["ctx"]["errors"])
         elif error["type"] == "too_short" and len(error["input"]) >= error["ctx"]["min_length"]:
             continue  # pydantic counts valid items only, and the invalid ones are told already

@@ -44,8 +44,8 @@ class BoardThread:
         self.link: Port | None = None
         self.machine: Backend | None = None
         self.progress = (0.0, 0.0)  # seconds of the job's motion, and of all of it
-        self.progress_seconds = 0.0  # the same seconds, not rounded
-        self.parts: list[Trajectory] = []  # of that motion, one after another; empty where it has no plan
+        self.progress_seconds = 0.0  # seconds that are not rounded
+        self.parts: list[Trajectory] = []  # trajectories of the motion, one after another; empty where it has no plan
         self.follower = ""  # id of the page that the arm follows; empty: none
         self._lock = threading.Lock()
         self._wake = threading.Event()

@@ -96,7 +96,7 @@ def _page_json(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: d
         "arm": drawn | {"locks": False, "meshes": meshes},
         "solver": solver,
         "plan": None if plan is None else playback_json(arm, plan),
-        "slice": None if task_name else reach_slice(arm),  # of the task that fits the arm
+        "slice": None if task_name else reach_slice(arm),  # slice of the task that fits the arm
     }
     return "".join(f"export const {name} = {_json_text(value)};\n" for name, value in values.items())
 

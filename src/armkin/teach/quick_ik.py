@@ -27,7 +27,7 @@ class QuickIk:
     """`ik`: of one arm by machine code once that is there; until then, of others, and without a compiler in Python."""
 
     def __init__(self) -> None:
-        self._arm: Arm | None = None  # that is built, or has been
+        self._arm: Arm | None = None  # arm that is built, or has been
         self._built: CompiledArm | None = None
         self.ready = threading.Event()  # built, or found not to be
 

@@ -40,7 +40,7 @@ class Program:
         self.arm = arm
         self.head: dict[str, Any] = {}  # start, task, blend, speed, tool_speed, tolerance: as in a path file
         self.moves: list[dict[str, Any]] = []  # each as in a path file
-        self.names: list[str] = []  # of the moves, "" if none was given
+        self.names: list[str] = []  # names of the moves, "" if none was given
         self.via: list[float] | None = None  # the point on the way of the arc that is being recorded
         self._undo_states: list[tuple[Any, ...]] = []
         self._redo_states: list[tuple[Any, ...]] = []
@@ -203,7 +203,7 @@ class Program:
         self.via = _round_values(fk(self.arm, q)[:3, 3].tolist())
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
-        typed = request_checks.text_field(fields, "name", 60)  # as a comment of YAML may have it: what can be printed
+        typed = request_checks.text_field(fields, "name", 60)  # a comment of YAML has what can be printed
         printable = "".join(c if c.isprintable() else " " for c in typed.replace("#", ""))
         self.names[self._move_index(fields)] = " ".join(printable.split())
 

@@ -109,7 +109,7 @@ class _Handler(BaseHTTPRequestHandler):
         try:
             serve()
         except RefusedError as error:
-            self.close_connection = True  # its body may still be on the way
+            self.close_connection = True  # the request's body may still be on the way
             self._send_json(error.status, {"error": str(error), "kind": "refused"})
         except OSError:
             self.close_connection = True

@@ -54,8 +54,8 @@ class LostSteps(NamedTuple):
     """What a switch that was met again tells of the counts."""
 
     joint: str
-    steps: int | None  # of its motor, that the counts were ahead of the arm; None: its position was not known
-    difference: float | None  # the same [rad | mm]
+    steps: int | None  # steps of its motor that the counts were ahead of the arm; None: its position was not known
+    difference: float | None  # way [rad | mm]
 
 
 class Gripped(NamedTuple):

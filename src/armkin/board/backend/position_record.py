@@ -37,7 +37,7 @@ class BoardNote:
 
     arm: str  # digest of what makes joint values of counts
     marks: dict[str, list[float] | str]
-    offset: list[int]  # of the board's own steps where the arm's counts are 0
+    offset: list[int]  # the board's own steps where the arm's counts are 0
     counts: list[int]  # where the arm stood, or where its motion began
     plan: NDArray[np.int64] | None = None  # (points, motors) [counts] corners of the way of the motion under way
 

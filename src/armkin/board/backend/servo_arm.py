@@ -134,7 +134,7 @@ class ServoArm(Backend):
             raise PositionKnownError("bus servos know their position: there is nothing to assume", joints=joints)
         self._read()
         self._check()
-        self._send(self._counts, np.zeros(len(self.ids)))  # so that none jumps to an old goal
+        self._send(self._counts, np.zeros(len(self.ids)))  # no servo may jump to an old goal
         for number, count in zip(self.ids, self._counts, strict=True):
             self.bus.write(number, self.bus.GOAL_POSITION, int(count))
         self.bus.torque(self.ids, on=True)

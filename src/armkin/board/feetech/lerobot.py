@@ -61,7 +61,7 @@ class ServoCalibration:
     limits: tuple[tuple[float, float], ...]  # [deg] of every joint
     gripper: Motor | None
     gripper_ends: tuple[float, float] | None  # open, closed [deg], counted from the gripper's middle
-    edits: Edits  # of the robot file
+    edits: Edits  # changes of the robot file
 
     def check(self, machine: ServoMachine) -> None:
         """Raise LinkError, naming the motor, if the register 31 of a servo is not the file's homing_offset."""

@@ -29,7 +29,7 @@ def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bo
     goal = round(gripper.zero + per * value)
     position = bus.read(number, registers.POSITION)
     if not bus.read(number, registers.TORQUE):
-        bus.write(number, registers.GOAL_POSITION, position)  # so that it does not jump to an old goal
+        bus.write(number, registers.GOAL_POSITION, position)  # the jaw must not jump to an old goal
         bus.write(number, registers.TORQUE, 1)
     speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else SPEED
     bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))

@@ -100,7 +100,7 @@ class _Run:
     def __init__(self, session: Session, axes: Sequence[int], progress: Progress) -> None:
         self._session, self._axes, self._progress = session, axes, progress
         self.under_way = _UnderWay()
-        self.end: Counts | None = None  # of the last plan
+        self.end: Counts | None = None  # counts at the last plan's end
         self._total = self._begun = self._done = 0.0  # [s] of all plans so far, in frames, done
 
     def begin_anew(self, seconds: float) -> None:

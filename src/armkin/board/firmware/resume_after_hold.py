@@ -36,7 +36,7 @@ class Note:
     robot: str  # the robot file's SHA-256
     plan: str  # digest of the plan
     start: list[int]  # counts where it began
-    seconds: float  # of the plan that were done, about
+    seconds: float  # seconds of the plan that were done, about
     stands: list[int] | None = None  # counts where it came to rest; None: the sender ended before it was told
 
 

@@ -55,7 +55,7 @@ class Session:
         self.was_reset = False  # a greeting was heard: all offsets and the position are gone
         self.report: Report | None = None
         self._unseen: Report | None = None
-        self.state = ""  # as last told
+        self.state = ""  # state that GRBL told last
         self.feed = 100  # [%] of feeds, as last told
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
@@ -79,7 +79,7 @@ class Session:
         end = self.port.now() + _BOOT
         while self.port.now() < end:
             self.port.write(replies.STATUS)
-            with suppress(GrblError):  # of another program's line, or of the memory that a new board has not written
+            with suppress(GrblError):  # another program's line may fail, or memory that a new board has not written
                 self._wait(lambda: self.report is not None, 0.25)
             if self.report is not None:
                 return self.report
@@ -133,7 +133,7 @@ class Session:
         self._other_lines.clear()
         self._send(line)
         if not self._wait(lambda: not self._sent, patience):
-            self._sent.clear()  # so that the next line's answer is not taken for this one's
+            self._sent.clear()  # the next line's answer must not be taken for this one's
             raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
         return list(self._other_lines)
 

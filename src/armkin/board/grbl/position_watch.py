@@ -35,7 +35,7 @@ class Watch:
     def __init__(self, job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> None:
         self._axes, self._offset = axes, offset
         self._times, self._points = _path_samples(job)
-        self._points_passed = 0  # of the points, which the arm has passed
+        self._points_passed = 0  # points that the arm has passed
         self._doubts = 0
         self._plan_time = 0.0  # [s] of the plan that were done
         self._progress_time = 0.0  # [s] since the start when that was seen
@@ -87,7 +87,7 @@ class Watch:
         if not near.any():
             return None
         first = int(near.argmax())
-        last = first + int(np.argmin(np.append(near[first:], False))) - 1  # of those that follow without a gap
+        last = first + int(np.argmin(np.append(near[first:], False))) - 1  # the last that follows without a gap
         times = self._times[begin:]
         self._points_passed = begin + first
         ends = [float(times[k] + share[k] * (times[k + 1] - times[k])) for k in (first, last)]

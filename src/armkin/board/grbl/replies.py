@@ -50,7 +50,7 @@ class Report:
     """One status report."""
 
     state: str  # Idle, Run, Hold, Jog, Alarm, Door, Check, Home, Sleep
-    detail: int  # of Hold and Door: 0 when the machine stands
+    detail: int  # number behind Hold and Door: 0 when the machine stands
     position: tuple[float, ...] | None  # machine position
     free: tuple[int, int] | None  # planner blocks and receive bytes
     pins: str  # inputs that are active: limits X Y Z A B C, probe P, door D, hold H, reset R, start S

@@ -40,7 +40,7 @@ class Lines:
 
     def __init__(self, job: Job, axes: Sequence[Axis]) -> None:
         self._job, self._axes = job, axes
-        self._slower: float | None = None  # of the pace, a line
+        self._slower: float | None = None  # share of the pace that each line takes away
         self.sent = 0.0  # [s] that all lines so far take
 
     def brake(self, seconds: float) -> None:

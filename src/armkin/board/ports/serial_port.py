@@ -73,7 +73,7 @@ class SerialPort:
         """Reset an Arduino that the opening did not reset; ports without DTR leave that to their opening."""
         with suppress(Exception):
             self._serial.dtr = self._serial.rts = False
-            time.sleep(0.05)  # its capacitor unloads
+            time.sleep(0.05)  # the board's capacitor unloads meanwhile
             self._serial.dtr = self._serial.rts = True
 
     def write_at(self, baud: int, data: bytes) -> None:

@@ -141,7 +141,7 @@ class Commands:
                 raise RefusedError(Error.DISABLED, i)
             most = self._setup.image.axes[i].max_rate
             most = max(most // 8, 1) if slow else most
-            if abs(rate[i]) > min(most, 2**31 - 1):  # its way back has to be a rate, too
+            if abs(rate[i]) > min(most, 2**31 - 1):  # the way back has to be a rate, too
                 raise RefusedError(Error.RATE, i)
 
     def _home(self, payload: bytes) -> None:

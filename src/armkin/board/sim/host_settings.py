@@ -21,7 +21,7 @@ class Setup:
         board, n = self.board, len(self.board.axes)
         self._bytes = bytearray(12 + 21 * n + (1 + n) * len(board.switches) + (8 + 2 * n) * board.rows)
         self.image = Image(tuple(AxisImage() for _ in board.axes))
-        self.crc = 0  # of the configuration; 0: not configured
+        self.crc = 0  # CRC of the configuration; 0: not configured
         self.drivers = self.pulses = False
         self.retained = False  # over a reset
 

@@ -33,7 +33,7 @@ class Pace(NamedTuple):
     first: int = 0  # reciprocal of the interval
     last: int = 0
     time: int = 0  # 2^-16 of 50 ms, at most 50 ms
-    windows: int = 0  # of a longer one: 2^-8 of 50 ms; else 0
+    windows: int = 0  # windows of a longer time: 2^-8 of 50 ms; else 0
 
 
 def _quarter_velocity(start: int, end: int, windows: int) -> int:

@@ -26,7 +26,7 @@ _SILENCE = 0.5  # time [s] of silence after which the board holds
 class _RetainedState:
     """What a reset leaves of an arm that stood still."""
 
-    image: bytes  # of the configuration, empty if there was none
+    image: bytes  # image of the configuration, empty if there was none
     drivers: bool
     known: int
     counts: list[int]

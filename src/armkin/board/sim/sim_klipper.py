@@ -30,9 +30,9 @@ class Refused(Exception):  # noqa: N818
 class Stepper:
     """A manual stepper."""
 
-    place: float = 0.0  # as commanded
+    place: float = 0.0  # place as commanded
     enabled: bool = False
-    letter: str = ""  # of the G-code axis that it is
+    letter: str = ""  # letter of the G-code axis that it is
     velocity: float = math.inf
     corner: float = 1.0
 
@@ -51,7 +51,7 @@ class Move:
 class Klipper(SimulatedTime):
     """The port of a simulated Klipper."""
 
-    settings: Mapping[str, Mapping[str, Any]]  # of printer.cfg: section -> option -> value
+    settings: Mapping[str, Mapping[str, Any]]  # settings in printer.cfg: section -> option -> value
     name: str = "sim"
     baud: int = 0
 
@@ -74,7 +74,7 @@ class Klipper(SimulatedTime):
         self._speeds: dict[str, float] = {}
         self._moves = deque[Move]()
         self._requests = deque[dict[str, Any]]()
-        self._lines: deque[str] | None = None  # of the script that is run
+        self._lines: deque[str] | None = None  # lines of the script that is run
 
     # The port
 

@@ -104,7 +104,7 @@ class _Row(NamedTuple):
     tip_error: list[float]
     error_mm: float
     violations: list[Violation]
-    beyond_travel: list[bool]  # of each motor, whether its servo cannot turn that far
+    beyond_travel: list[bool]  # whether each motor's servo cannot turn that far
 
     def answer(self, of_all: dict[str, Any]) -> Pulses:
         """The row's object; of_all: what all rows begin with."""

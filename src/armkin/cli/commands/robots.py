@@ -57,7 +57,7 @@ def _task_and_target(arm: Any) -> tuple[str | None, list[str], list[str]]:
         task = task_for(arm)
     except UsageError as error:
         return None, [], [str(error)]
-    free = arm.n - task.constraints  # of one joint to spare ik lists families; of more it asks for held ones
+    free = arm.n - task.constraints  # with one joint to spare ik lists families; with more it asks for held ones
     return task.name, list(task.labels), [f"hold {free} joints with --lock"] if free > 1 else []
 
 

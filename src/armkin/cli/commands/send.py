@@ -221,7 +221,7 @@ def _report_end(
     if problem is not None and not planned["waypoints"]:
         raise problem  # nothing has moved: there is nothing to tell
     if problem is not None and json and not isinstance(problem, NoSolutionError):
-        problem.fields["sent"] = answer  # of exit codes, 0 and 3 alone have something on stdout
+        problem.fields["sent"] = answer  # exit codes 0 and 3 alone have something on stdout
         raise problem
     with output.answer_stream(trace) as write:
         write(render.to_json(answer) + "\n" if json else _arrival_text(arm, planned, answer))

@@ -26,7 +26,7 @@ class Tables(NamedTuple):
     thick: list[float]  # radius of each segment [mm]
     solid: int  # bodies that are held against obstacles
     moving: list[tuple[int, int]]  # a segment, and its body's place among those
-    shapes: list[tuple[int, list[float]]]  # of each obstacle its kind's number and its numbers
+    shapes: list[tuple[int, list[float]]]  # number of each obstacle's kind, and its numbers
     crossings: list[tuple[int, int, int]]  # a segment, another, and their pair
     pairs: list[tuple[str, str]]  # names: a body, and what it is held against
 

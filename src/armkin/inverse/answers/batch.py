@@ -151,7 +151,7 @@ def pack_branches(part: Batch, count: Int) -> None:
         array.take(rows, axis=0, out=padded[:-1].reshape(len(rows), B, *width), mode="clip")
         padded[-1] = missing
         array[rows] = padded.take(source, axis=0).reshape(len(rows), B, *width)
-    if most < B:  # those of all others as slices
+    if most < B:  # the others' rows are taken as slices
         part.valid[rows] = np.arange(B) < most
         present = np.flatnonzero(part.valid)
         for array, missing in arrays:

@@ -101,7 +101,7 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     N, n = near.shape
     pool, features = _pool(arm, task)
     goal = _target_features(arm, task, target)
-    apart = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # and the goal's own square
+    apart = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # the goal's own square changes no order
     nearest = np.argpartition(apart, STARTS, axis=1)[:, :STARTS]
     nearest.sort(axis=1)
     home = np.broadcast_to(np.clip(arm.home, arm.lower, arm.upper), (N, 1, n))

@@ -55,7 +55,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
     if lower <= first and upper >= last + TURN:
         return value, True
     below, above = value < lower - SLACK, value > upper + SLACK
-    # of a value below the limits the first copy above their lower end is the nearest legal one, if any is; it
+    # a value below the limits has its nearest legal copy just above their lower end, if any is legal; it
     # lies in the turn after the one around `near`, so it can help no `near` if the limits end before the first of these
     if upper > first + TURN - SLACK and below.any():
         moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)

@@ -90,7 +90,7 @@ class _EndJoints:
     ) -> tuple[list[Pair], Doubt]:
         """The three joints on branch axes (b0, b1, 1, N), and doubt; height: what is known in (2) for directions."""
         ta, tb = self.La[9:12], Lb[9:12]
-        factors = [[arrays.mul(-1.0, v) for v in (Lb[2], Lb[5], Lb[8])], pose.turn_back(Lb, tb)]  # of g
+        factors = [[arrays.mul(-1.0, v) for v in (Lb[2], Lb[5], Lb[8])], pose.turn_back(Lb, tb)]  # factors of g
         right: list[Entry] = [0.0, height]
         if self.points:
             length = arrays.sub(arrays.add(arrays.dot(e, e), arrays.dot(ta, ta)), arrays.dot(d, d))

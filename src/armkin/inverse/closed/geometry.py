@@ -46,8 +46,8 @@ class Geometry:
     unmoved: Callable[[Array], Rows] | None = None  # `rows` for targets that are examined where they are in doubt
     labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
     ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
-    elimination: Any = None  # of `rows`: the prepared elimination that they come from, if they do
-    ends: tuple[int, ...] = ()  # of `pairs`: joints that, where they are free, may leave others few solutions or more
-    doubts: Geometry | None = None  # of `pairs`: a slower way for the targets that are in doubt
-    places: Callable[[Array, Array], Int] | None = None  # of an elimination's branches: their indices
-    branches: int | None = None  # of `rows`: columns that the labels name; what follows is numbered
+    elimination: Any = None  # prepared elimination that `rows` come from, if they do
+    ends: tuple[int, ...] = ()  # joints of `pairs` that, where they are free, may leave others few solutions or more
+    doubts: Geometry | None = None  # slower way than `pairs` for the targets that are in doubt
+    places: Callable[[Array, Array], Int] | None = None  # indices of an elimination's branches
+    branches: int | None = None  # columns of `rows` that the labels name; what follows is numbered

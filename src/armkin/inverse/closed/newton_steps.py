@@ -47,7 +47,7 @@ class NewtonSteps:
         first_sums, last_sums = task.sums[:, : self.size], task.sums[:, self.size :]
         follow = -np.linalg.solve(last_sums, first_sums) if len(task.sums) else np.zeros((0, self.size))
         self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
-        error = min(SLOPE * distance, 0.5)  # its square after a step, and so on
+        error = min(SLOPE * distance, 0.5)  # each step squares the error
         least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
         self.steps = min(least + 1, MAX_STEPS)  # one more, and two thirds of those near a singularity need no other way
         self.counted = task.name == "xyz" and not arm.prismatic.any()

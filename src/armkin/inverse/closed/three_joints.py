@@ -147,7 +147,7 @@ class Position:
             third, doubt = quadratics.turn(squared, size, prefer[2])
         else:
             # gx, gy are quadratic in d3; with d3 = scale tan(q/2) the quartic becomes a trigonometric one
-            k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # of d^0 ... d^4
+            k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # coefficients of d^0 ... d^4
             for six in g:
                 quad = [six[0], six[1], six[3]]
                 for i in range(3):

@@ -112,7 +112,7 @@ class ThreeParallel:
         w = pose.turn_back(D, [nx, ny, n[2]])
         disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
         thresholds = precision()
-        # of an oblique wrist both roots merge whole
+        # an oblique wrist's two roots merge whole
         tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
         fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
         c5, s5 = fifth

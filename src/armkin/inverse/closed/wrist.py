@@ -65,7 +65,7 @@ class Wrist:
             return self._solve_mirrored(x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         thresholds = precision()
-        # of an oblique wrist both roots merge whole
+        # an oblique wrist's two roots merge whole
         tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, tangent)
         fourth, sixth, doubt4, wrong = self._turn_about_middle(fifth, x, z, disc, prefer)

@@ -74,7 +74,7 @@ def pose_kinds(closed: Loop, goal: Array) -> Int:
     kind = np.zeros(len(goal), np.int64)
     if closed.prismatic[[0, 5]].any():
         return kind
-    x, y = goal[:, 0, 2], goal[:, 1, 2]  # of axis 6; axis 1 is z
+    x, y = goal[:, 0, 2], goal[:, 1, 2]  # direction of axis 6; axis 1 is z
     sine = np.hypot(x, y)
     apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, tol.TINY)
     kind[apart < tol.BESIDE_SPECIAL] = Kind.MEETING

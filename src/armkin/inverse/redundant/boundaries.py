@@ -110,8 +110,8 @@ class _Held:
         shoulder = (bounds.link[7] @ inverse(self.target) @ base)[:, :3]
         self.to = self.turned(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # the shoulder
         self.far = (self.to * self.to).sum(axis=0)  # squared
-        self.cos = (bounds.still - self.far) / (2.0 * bounds.swing)  # of joint 4, from its middle
-        self.square = 1.0 - self.cos * self.cos  # of its sine, s
+        self.cos = (bounds.still - self.far) / (2.0 * bounds.swing)  # cosine of joint 4, from its middle
+        self.square = 1.0 - self.cos * self.cos  # square of its sine, s
 
     def turned(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""

@@ -162,7 +162,7 @@ class Places(NamedTuple):
     there: Array
     legal: Array
     short: Changes  # the ends of branches that legal stretches lie at that hold no sample
-    ends: tuple[Array, Array]  # of these: where the branch ends, and where its limit is crossed
+    ends: tuple[Array, Array]  # where the branch ends, and where its limit is crossed
 
 
 def places_of(follower: Follower, shown: Summary) -> Places:

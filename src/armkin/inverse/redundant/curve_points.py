@@ -66,7 +66,7 @@ def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: flo
         longest = np.abs(step).max(axis=1)
         q[part] += step * np.minimum(1.0, MAX_STEP / np.maximum(longest, MAX_STEP))[:, None] * unit
         size[part] = np.where(np.isnan(longest), np.inf, longest)
-        going = going[~(size[part] < enough)]  # its square is left
+        going = going[~(size[part] < enough)]  # the residual left is the square of the step
     return Points(q, tangent, size)
 
 

@@ -52,7 +52,7 @@ class Planes(NamedTuple):
     """Values of a joint that are answered: (N, V), inf behind the last ones, and how many of each target (N,)."""
 
     follower: Follower
-    guide: Redundancy  # that joint, and the others
+    guide: Redundancy  # the joint that guides, and the others
     values: Array
     counts: Int
 
@@ -98,7 +98,7 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
     planes = Planes(follower, guide, np.full((N, int(count.max(initial=PLANES))), np.inf), count)
     planes.values[row, plane] = t
     sample, branch = np.nonzero(solving)
-    last = np.arange(N * PLANES, len(row))  # those between are answers already, of no branch
+    last = np.arange(N * PLANES, len(row))  # rows between are answers already, of no branch
     start = np.append(q[sample, branch], extra, axis=0)
     sample, branch = np.append(sample, last), np.append(branch, np.full(len(last), q.shape[1]))
     nodes, good = planes.answers(row[sample], plane[sample], start)

@@ -226,7 +226,7 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     rows = np.flatnonzero(curves.pieces.legal)
     if not len(rows):
         return best
-    if isinstance(curves, Followed):  # of others these are samples
+    if isinstance(curves, Followed):  # other curves have samples here
         for t in curves.values_to_try(rows_of(curves.pieces, rows), near[rows]):
             costs(rows, t)
     # a sample beside which the motion grows both ways is at a kink or limit, and the nearest posture itself

@@ -52,7 +52,7 @@ def _local(arm: Arm, box: Box, q: Array, target: Array) -> _Local:
     trace = np.trace(C, axis1=1, axis2=2)
     twist = np.stack([C[:, 2, 1] - C[:, 1, 2], C[:, 0, 2] - C[:, 2, 0], C[:, 1, 0] - C[:, 0, 1]], axis=1)
     g = 0.5 * np.einsum("mi,mij->mj", twist, w)
-    # of joints i <= j: d2R = [w_i][w_j] R, d2p = w_i x dp_j
+    # joints i <= j have d2R = [w_i][w_j] R, d2p = w_i x dp_j
     H = -0.5 * (np.einsum("mai,mab,mbj->mij", w, C, w) - np.einsum("mai,maj->mij", w, w) * trace[:, None, None])
     bend = np.cross(w.swapaxes(1, 2)[:, :, None], p.swapaxes(1, 2)[:, None]).transpose(0, 3, 1, 2)
     upper = np.triu(np.ones((arm.n, arm.n)))

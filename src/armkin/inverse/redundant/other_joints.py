@@ -43,7 +43,7 @@ class Sampled(NamedTuple):
     """Answers of targets S at K values of the redundant joint, in the columns of their branches."""
 
     t: Array  # (S, K) these values
-    values: list[Array]  # of each joint, its branch axes, perhaps of length 1, before all samples (S K,)
+    values: list[Array]  # values of each joint: branch axes, perhaps of length 1, before all samples (S K,)
     axes: tuple[int, ...]  # lengths of the branch axes
     valid: Bool  # (S, K, B)
     legal: Bool
@@ -159,7 +159,7 @@ class Follower(NamedTuple):
         near = self.near[np.repeat(pick, t.shape[1])].T
         shape = (*axes, t.size)
         legal, cost, room = present, np.zeros(()), np.full(shape, 2 * np.pi)
-        for j in sorted(range(len(columns)), key=lambda j: columns[j].size):  # those on few branch axes first
+        for j in sorted(range(len(columns)), key=lambda j: columns[j].size):  # joints on few branch axes come first
             columns[j], fits = nearest_of_joint(self.arm, j, columns[j], near[j])
             legal, cost = legal & fits, cost + motion_of_joint(self.arm, j, columns[j], near[j])
             within_limits(self.arm, j, columns[j], room)

@@ -45,7 +45,7 @@ class Traced(NamedTuple):
     """`families.Curves` of targets N by tracing: their parameter counts the points of a curve."""
 
     follower: Follower
-    points: Points  # of all curves, one after the other
+    points: Points  # points of all curves, one after the other
     ways: Ways  # from each point to the one after it
     row: Int  # (P,) whose target
     begin: Int  # (C,) first point of each curve

@@ -43,7 +43,7 @@ def _cells(degree: int) -> tuple[Array, float, Array]:
     middle, half = -np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count), np.pi / count
     k, order = np.arange(degree + 1), np.arange(TERMS)
     factor = (1j * k[:, None] * half) ** order / np.array([math.factorial(i) for i in order])
-    factor[1:] *= 2.0  # that of -k is the conjugate
+    factor[1:] *= 2.0  # the factor of -k is the conjugate
     wave = np.exp(1j * k[:, None] * middle)[:, :, None] * factor[:, None]  # (k, C, TERMS)
     series: Array = np.concatenate([wave.real, -wave.imag])
     return np.asarray(middle), half, series.reshape(2 * degree + 2, -1)

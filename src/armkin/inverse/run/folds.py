@@ -93,7 +93,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     double = np.abs(way).max(axis=1) < PAIR_DISTANCE
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
-    partners[i[double]], weak[i[double]] = 0, True  # of double roots the first stands for both
+    partners[i[double]], weak[i[double]] = 0, True  # the first of a double root's two stands for both
     lone = np.flatnonzero(weak & (partners == 0) & decided[k])
     if len(lone):
         isolated, turns = _by_curvature(goals, q[lone], inverse[lone], beside[lone])

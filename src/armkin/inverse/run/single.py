@@ -58,7 +58,7 @@ class OneTarget:
         self._plain = [not a for a in output_axes]  # outputs that are a number, not a tuple
         places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in output_axes[: arm.n + 1]]
         first = np.cumsum([0, *(math.prod(a) for a in output_axes[: arm.n - 1])])
-        # of all joints' values one after the other, those of every branch
+        # joint after joint, the values of every branch
         index = np.stack(places[: arm.n], axis=1) + first
         self._rows = [itemgetter(*row, row[0]) for row in index.tolist()]  # one more: of one alone it makes no tuple
         self._all = itemgetter(*index.ravel().tolist(), 0)

@@ -99,7 +99,7 @@ class _Groups:
         # `near` leads its group, else the most exact candidate: one between two branches must not join them
         self.rank = np.maximum(at.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
-        self.open: Bool = self.valid & ~at.simple  # those of no group yet
+        self.open: Bool = self.valid & ~at.simple  # candidates of no group yet
         self.weak: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on_motion
         lost.sigma[on_motion] = 0.0
         self.asked: Bool = ~(self.open & self.weak)  # what component it is on; pushed: whether pushes move it
@@ -207,7 +207,7 @@ class _Groups:
         arm, near = self.goals.arm, self.goals.near
         q, label, size = self.at.q, self.at.label, self.at.size
         sure = self.known[k, b]
-        exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # of known components as in `_plain`
+        exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # a known component's as in `_plain`
         away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         group: Bool = np.asarray(self.component[self.place[k, b]])
         unlisted = ~(group & self.at.simple[k]).any(axis=1)
@@ -216,7 +216,7 @@ class _Groups:
         group &= self.open[k]
         on = self._on_motion(k, b, away, group | ~self.open[k]) | (group & (sure & moving)[:, None])
         on[np.arange(len(k)), b] = True
-        mine = on | group  # but what is one with it along a curve beside the self-motion is not on that
+        mine = on | group  # what is one with it along a curve beside the self-motion is not on that
         self.open[k] &= ~mine
         self.double[k] |= self.edge[k, b]
         self.singular[k] |= moving
@@ -264,7 +264,7 @@ class _Groups:
         q, joints = self.at.q, self.which[k, b]
         held = np.where(joints[:, None], 0.0, away).max(axis=2)
         # two postures of one self-motion may each be off by as much as a double root
-        moving = self.moves[k, b] & ~self.ended[k, b]  # of others all that is on them is one with them
+        moving = self.moves[k, b] & ~self.ended[k, b]  # all that is on other components is one with them
         mine: Bool = moving[:, None] & (held < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION) & self.open[k]
         far = mine & ~group & (joints.sum(axis=1) > 2)[:, None]
         rows = np.flatnonzero(far.any(axis=1))
@@ -281,12 +281,12 @@ class _Groups:
         """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
         that are near lie beyond a fold."""
         small = self.valid.shape[1] <= FEW_CANDIDATES
-        # those that lose several directions when they lead; of many, those that lose one, too
+        # candidates that lose several directions are asked once they lead; among many, those that lose one, too
         asking = ~self.asked & (self.lost.nullity < 2)
         if asking.any() and (small or asking.sum() <= AT_ONCE):
             self._ask(*np.nonzero(asking))
         if small:
-            asking = self.open & self.asked & ~self.pushed  # of one target eight in a row take five times as long
+            asking = self.open & self.asked & ~self.pushed  # eight of one target in a row take five times as long
             if 0 < asking.sum() <= AT_ONCE:
                 self._push(*np.nonzero(asking))
             asking = self.open & self.weak & self.pushed & ~self.known & ~self.moves

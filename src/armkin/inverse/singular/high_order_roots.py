@@ -57,7 +57,7 @@ def equal_candidates(
         miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))
         further = solves_between(arm, task, start, way, miss, weakest, target[k[row]])
         same[row, column] = further
-        for i in np.unique(row[further]):  # and those that rounding alone parts from these
+        for i in np.unique(row[further]):  # rounding alone parts others from these, which are one with them, too
             postures, members = q[k[i]], np.flatnonzero(same[i])
             apart = newton.wrapped_distance(arm, postures[:, None], postures[members])
             close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], members]))

@@ -54,7 +54,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
             continue
         row = np.array([k])
         batch = write_branches(arm, batch, row, decision.q, decision.valid, decision.label, near[row])
-        batch.status[k] = max(batch.status[k], decision.status[0])  # of two roots in one, one was listed
+        batch.status[k] = max(batch.status[k], decision.status[0])  # one of two roots in one was listed
         batch.free[k] |= decision.free[0]
     return batch
 

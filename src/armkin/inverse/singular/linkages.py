@@ -69,13 +69,13 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     k, s, b = np.nonzero(solving & decided[:, None, None] & (motions.joint >= 0)[:, None])
     if len(k):
         circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
-    solving[:, 1:] &= ~motions.line[:, None]  # of a line the posture at the first value is the nearest
+    solving[:, 1:] &= ~motions.line[:, None]  # a line's posture at the first value is the nearest
     key = np.where(solving, 2 * leader[:, None] + circuit, 2 * B).reshape(K, -1)
     # a self-motion of two circuits may have candidates on one of them alone
     on_circuit = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
     half = decided & ((motions.joint >= 0) & (on_circuit.sum(axis=2) == 1)).any(axis=1)
     decided &= ~half
-    # of each circuit the posture with the least motion is listed
+    # each circuit's posture with the least motion is listed
     q = q.reshape(K, S * B, n).copy()
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     order = np.lexsort((motion, key))

@@ -114,7 +114,7 @@ def _structure_of_jacobians(linear: newton.Linear) -> Structure:
     known, manifold, boundary, followed, alone = np.zeros((5, M), bool)
     joints, (low, high), (least, most) = np.zeros((M, n), bool), np.zeros((2, M)), np.zeros((2, M, n))
     v, second, longer = V[:, -1], S[:, n - 2] if n > 1 else np.ones(M), np.ones(M)
-    span, lost = 1.2 * tol.REACH / np.abs(v).max(axis=1), r.shape[1] - n + 1  # of fewer joints more are out of reach
+    span, lost = 1.2 * tol.REACH / np.abs(v).max(axis=1), r.shape[1] - n + 1  # fewer joints leave more out of reach
     x, g = np.zeros((NODES, M, n)), np.zeros((NODES, M, max(lost, 1)))
     ends = low, high, span, least, most, followed, longer
     return Structure(known, manifold, boundary, joints, *ends, alone, v, second, x, g)

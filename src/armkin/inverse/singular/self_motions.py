@@ -40,7 +40,7 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
         for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH) & ~curve[k].any(axis=1)):
             away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
             pairs += [(int(k), int(i), int(j)) for j in mine[(away < tol.CLOSE_BY) & narrow]]
-        mine = mine[sigma[k, mine] < tol.SOLUTION]  # of double roots the posture listed may be off it
+        mine = mine[sigma[k, mine] < tol.SOLUTION]  # a double root's listed posture may be off it
         for i in mine[mine > 0]:
             wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]

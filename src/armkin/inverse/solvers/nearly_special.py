@@ -53,7 +53,7 @@ def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
     """Arms that a closed form would fit if their axes moved by `NEAR_DEFECT`, or by more if nothing else fits."""
-    # of an axis see `armkin.inverse.solvers.tool_axis`
+    # an axis is solved in `armkin.inverse.solvers.tool_axis`
     if task.orientation == "axis" or (nearest := _nearest_class(arm, task)) is None:
         return None
     gap, alike = nearest
@@ -228,7 +228,7 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
     weak = min(tol.STEADY_VALUE, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
-    limit = 9.0 * gaps[:, None]  # of a squared residual: a pair that only just misses being real misses by a root
+    limit = 9.0 * gaps[:, None]  # bound of a squared residual: a pair that just misses being real misses by a root
     real = miss < limit
     for moved in targets_around(arm, task, target, AROUND_FACTOR * gaps):
         q, miss, doubt_there = source.rows(moved)

@@ -26,7 +26,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
     Raises UsageError if the task does not fit the arm.
     """
     task = task_for(arm, task_name)
-    if task_name is None:  # the same geometry, prepared once, as that of the task by its name
+    if task_name is None:  # the geometry of the task by its name is this one, prepared once
         return solver(arm, task.name)
     if arm.n > task.constraints:
         surplus = arm.n - task.constraints

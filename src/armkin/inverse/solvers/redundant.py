@@ -31,8 +31,8 @@ class Redundancy(NamedTuple):
 
     joint: int
     rest: Arm
-    task: Task  # of the arm itself
-    geometry: Geometry  # of the rest
+    task: Task  # task of the arm itself
+    geometry: Geometry  # geometry of the rest
 
     @property
     def still(self) -> bool:
@@ -60,7 +60,7 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
     if arm.n != task.constraints + 1 or arm.n < 3:
         return None
     if task_name is None:
-        return redundancy(arm, task.name)  # the same rest, prepared once
+        return redundancy(arm, task.name)  # the rest is prepared once
     options = []
     for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
         if not arm.prismatic[joint]:

@@ -22,7 +22,7 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
         missing[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
         # half the sum of the columns' vector products is the rotation vector to third order
         R, back = T[:, :3, :3], np.swapaxes(target[:, :3, :3], 1, 2)
-        C = np.ascontiguousarray(R) @ np.ascontiguousarray(back)  # of views it takes three times as long
+        C = np.ascontiguousarray(R) @ np.ascontiguousarray(back)  # views take three times as long
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
             missing[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
         far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN

@@ -149,7 +149,7 @@ class _Linking:
         self.torn = np.insert(self.torn & ~fresh, rows, False)
         self.both = np.insert(self.both & ~fresh, rows, False)
         self.crossing = np.insert(self.crossing & ~fresh, rows, False)
-        begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(steps))  # of the divided steps
+        begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(steps))  # begins of the divided steps
         self._link()
         self._give_up(begins[:, None] + np.arange(parts))
         return True

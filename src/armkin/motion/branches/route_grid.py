@@ -128,10 +128,10 @@ def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, ex
     """How many times too long intervals without rests are (M,), by `distance` from the route and the way from their
     chord."""
     deviations, steps, h = (np.delete(values, path.rests) for values in (distance, _chord_bounds(arm, path), path.h))
-    coarse = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # of second order in h
+    coarse = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # the error is of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
         coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
-    return np.maximum(np.cbrt(deviations / tolerance), coarse)  # of third order in h
+    return np.maximum(np.cbrt(deviations / tolerance), coarse)  # the error is of third order in h
 
 
 def _part_counts(excess: Array, exact: bool) -> Int:

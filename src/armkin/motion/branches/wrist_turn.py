@@ -135,7 +135,7 @@ def _widest_window(
         return turning[-1], window(turning[-1])
     for k in reversed(numbers) if aside else ():
         around = _window_with_offset(arm, route, window(k))
-        if around is None or around.tip_offset > aside:  # of a narrower one as well
+        if around is None or around.tip_offset > aside:  # a narrower window has it as well
             return None
         if _follows_detour(arm, route, around):
             return k, around

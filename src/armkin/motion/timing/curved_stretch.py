@@ -18,7 +18,7 @@ class Curve:
 
     path: Knots
     x: Array  # (N,) (ds/dt)^2 at the grid points
-    waypoints: int = 1  # that it leads through, its end included
+    waypoints: int = 1  # waypoints that it leads through, its end included
 
     @cached_property
     def times(self) -> Array:

@@ -82,8 +82,8 @@ def seven_phases(length: float, speed: float, accel: float, jerk: float) -> Prof
     """
     if length <= 0:
         return rest_profile(0.0)
-    bend = min(accel / jerk, math.sqrt(speed / jerk))  # of changing acceleration
-    rise = bend + speed / (bend * jerk)  # of speeding up, all in all
+    bend = min(accel / jerk, math.sqrt(speed / jerk))  # time of changing acceleration
+    rise = bend + speed / (bend * jerk)  # time of speeding up, all in all
     cruise = length / speed - rise
     if cruise < 0:
         cruise = 0.0

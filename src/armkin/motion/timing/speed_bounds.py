@@ -77,7 +77,7 @@ class Bound:
     def motion_in(self, intervals: Intervals) -> Motion:
         """What is bounded along some of the intervals."""
         first, left, right = self.path.slopes(intervals)
-        low = np.minimum(self.accel[:-1][intervals], self.accel[1:][intervals]).T  # of two limits the lower one counts
+        low = np.minimum(self.accel[:-1][intervals], self.accel[1:][intervals]).T  # the lower one of two limits counts
         if self.weights is not None:
             weights, most = self.weights
             first, left, right = (np.concatenate([x, weights @ x]) for x in (first, left, right))
@@ -91,7 +91,7 @@ class Fastest:
     def __init__(self, bound: Bound, cap: Array) -> None:
         self.bound, self.cap = bound, cap
         M = len(cap) - 1
-        self.share = np.ones((bound.count, M), np.float32)  # of the accelerations
+        self.share = np.ones((bound.count, M), np.float32)  # share of the accelerations
         parts = [self._functions(intervals) for intervals in interval_parts(M)]
         self.backward_bounds = concatenate_least([bounds for bounds, _ in reversed(parts)])
         self.forward_bounds = concatenate_least([bounds for _, bounds in parts])

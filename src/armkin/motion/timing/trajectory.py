@@ -56,7 +56,7 @@ class Straight:
 
     start: Array  # (n,) [rad | mm]
     end: Array  # (n,)
-    law: Profile  # of the line's parameter, 0 to 1
+    law: Profile  # law of the line's parameter, 0 to 1
 
     @property
     def duration(self) -> float:

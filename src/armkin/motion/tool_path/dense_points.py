@@ -135,7 +135,7 @@ class _Spots:
                 w = rotation_vectors(self.turned[a : b + 1] @ self.turned[a].T)
                 for k in np.flatnonzero(np.linalg.norm(w, axis=1) > 0.5 * np.pi).tolist():
                     size = np.linalg.norm(w[k])
-                    longer = w[k] * (1 - 2 * np.pi / size)  # the same rotation, the other way round
+                    longer = w[k] * (1 - 2 * np.pi / size)  # this is the rotation the other way round
                     if k and np.linalg.norm(longer - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
                         w[k] = longer
             else:

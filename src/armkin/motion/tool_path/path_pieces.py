@@ -116,8 +116,8 @@ class Piece:
     length: float
     speed: float | None = None  # fraction of the joints' max_speed, of this move
     tool_speed: float | None = None  # [mm/s] of this move
-    rate: float | None = None  # of a straight line: millimetres of the position for each of length
-    dense: Dense | None = None  # of points that became one curve
+    rate: float | None = None  # millimetres of a straight line's position for each of length
+    dense: Dense | None = None  # points that became one curve
 
     def targets(self, s: Array) -> Array:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""

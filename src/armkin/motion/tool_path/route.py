@@ -157,7 +157,7 @@ def join_pieces(
     """
     reduced = ReducedBlends() if reduced is None else reduced
     made: list[Piece] = []
-    side = 0.0  # of the last piece, before it was cut
+    side = 0.0  # length of the last piece, before it was cut
     stops, order = {0}, {}
     rests: set[int] = set()  # values of `order`
     for k, piece in enumerate(pieces):

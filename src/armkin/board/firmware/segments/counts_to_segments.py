@@ -60,7 +60,7 @@ class Move:
     start: Counts  # (motors,)
     end: Counts  # (motors,)
     segments: Segments
-    cycles: int  # of the clock, all segments together
+    cycles: int  # cycles of the clock, all segments together
     curve: bool = False
     brake: float = 1.0  # share of the motors' accelerations that a hold takes
 
@@ -110,7 +110,7 @@ class Cutter:
         owed = self._owed(aims, seconds, make_up)
         ways = [aim - before + x for aim, before, x in zip(aims, self._aims, owed, strict=True)]
         self._aims = aims
-        steps = max(map(abs, ways), default=0) / STEP  # of the fastest motor
+        steps = max(map(abs, ways), default=0) / STEP  # steps of the fastest motor
         exact = seconds * self.clock + self.late
         if unheard:
             ticks = self._tick_count(exact, steps)
@@ -222,7 +222,7 @@ def _evenly_spread(cycles: float, ticks: int) -> tuple[int, int]:
     mean of that is 1 - 1 / A up to A = 2, and 2 - 3 / A up to 3.
     """
     interval = int(cycles // ticks)
-    part = cycles / ticks - interval  # of a cycle, that the mean interval is longer
+    part = cycles / ticks - interval  # the mean interval is longer by this part of a cycle
     if part * ticks < 1:
         return interval, 0
     return interval, round((1 / (1 - part) if part < 0.5 else 3 / (2 - part)) * 65536 / ticks)

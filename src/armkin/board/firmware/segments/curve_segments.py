@@ -82,7 +82,7 @@ class CurveSegments:
         ends = exact_pulses(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
         counts = exact_pulses(self.arm, self.stretch.evaluate(t))
         for offset, since in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
-            span = np.sqrt(6 * np.abs(offset) / (_SETTLING * motor_accel(self.arm)))  # of f^2 (3 - 2 f)
+            span = np.sqrt(6 * np.abs(offset) / (_SETTLING * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6 at most
             f = np.clip(since[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
             counts = counts + offset * (1 - f * f * (3 - 2 * f))
         return np.asarray(counts)

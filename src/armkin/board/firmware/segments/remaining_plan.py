@@ -26,7 +26,7 @@ class Place:
     """Where an arm stands on its plan."""
 
     part: int
-    stretch: int  # of the part
+    stretch: int  # index among the part's stretches
     seconds: float  # since the stretch began
     elapsed: float  # seconds since the plan began
 

@@ -52,9 +52,9 @@ _AT_ONCE = 512  # bounds of segments that are held, of a longer line
 class Pieces(IntEnum):
     """How many segments a ramp has."""
 
-    FINE = 0  # so many that the acceleration is right to 2 %
+    FINE = 0  # pieces so many that the acceleration is right to 2 %
     FEW = 1  # a short move so few that the queue holds all of it, however late the host is; right to 7 %
-    ROUGH = 2  # so few that a bad line brings them in time; right to 10 %
+    ROUGH = 2  # pieces so few that a bad line brings them in time; right to 10 %
 
 
 def line_segments(

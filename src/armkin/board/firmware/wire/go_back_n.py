@@ -30,7 +30,7 @@ class _Frame:
 
     make: Callable[[int], bytes]
     segments: int
-    seconds: float  # of motion
+    seconds: float  # seconds of motion
 
 
 class Window:
@@ -46,7 +46,7 @@ class Window:
         self._gap = False  # the first of those that were sent is lost for certain
         self._sent_at = 0.0  # when any was written last
         self._deaf = 0.0  # until then an answer may be to what was sent before the last going back
-        self._bytes = _BYTES[1]  # that may be under way
+        self._bytes = _BYTES[1]  # bytes that may be under way
 
     def begin(self, info: Info) -> None:
         """Start with a new session: nothing is under way, the queue is empty."""

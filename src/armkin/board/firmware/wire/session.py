@@ -201,7 +201,7 @@ class Session:
         """Take the replies that come within timeout [s]; LinkError for those of another session or board."""
         for reply in self.line.replies(timeout):
             self.heard = self.port.now()
-            if isinstance(reply, Info):  # of a HELLO that was repeated
+            if isinstance(reply, Info):  # a repeated HELLO has this answer
                 reply_checks.check_session(reply.nonce & 0xFFFF, self._digest, self.port.name)
                 continue
             assert self.info is not None
