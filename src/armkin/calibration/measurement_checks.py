@@ -18,7 +18,7 @@ from armkin.model.units import radian_or_reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LEAST_ROWS = 4  # rows of a measurement, at least
+MIN_ROWS = 4  # rows of a measurement, at least
 STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint does not move
 ON_A_LINE = 0.01  # thickness of a cloud on a line, at most, as a share of the rows' length
 FITS = 0.1  # miss, as a share of the rows' spread, that needs no explanation
@@ -27,9 +27,9 @@ EXPLAINS = 0.35  # share of the miss as given that another reading must leave to
 
 def check_measurements(arm: Arm, data_rows: Measurements) -> None:
     """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
-    if len(data_rows) < LEAST_ROWS:
+    if len(data_rows) < MIN_ROWS:
         rows = "1 row is" if len(data_rows) == 1 else f"{len(data_rows)} rows are"
-        raise UsageError(f"{rows} too few; measure at least {LEAST_ROWS}, better 20 to 60")
+        raise UsageError(f"{rows} too few; measure at least {MIN_ROWS}, better 20 to 60")
     _check_motion(arm, data_rows)
     _check_spread(data_rows)
     _check_readings(arm, data_rows)
@@ -56,7 +56,7 @@ def _check_motion(arm: Arm, rows: Measurements) -> None:
 def _check_spread(rows: Measurements) -> None:
     centred = rows.position - np.median(rows.position, axis=0)
     # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
-    near = np.argsort(np.linalg.norm(centred, axis=1))[: max(LEAST_ROWS, math.ceil(0.8 * len(centred)))]
+    near = np.argsort(np.linalg.norm(centred, axis=1))[: max(MIN_ROWS, math.ceil(0.8 * len(centred)))]
     sizes = np.linalg.svd(centred[near] - centred[near].mean(axis=0), compute_uv=False)
     if sizes[1] < ON_A_LINE * sizes[0] or sizes[0] == 0:
         raise UsageError(

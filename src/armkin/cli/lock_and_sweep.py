@@ -41,7 +41,7 @@ def locked_radians(arm: Arm, words: Sequence[str] | None) -> dict[str, float]:
 
 def swept_values(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float]) -> dict[str, list[float]]:
     """`--sweep J=LOW:HIGH:COUNT`: joint name -> values [deg | mm], both ends included."""
-    from armkin.inverse.choose_branch import MOST_SWEEPS
+    from armkin.inverse.choose_branch import MAX_SWEEPS
 
     values_of: dict[str, list[float]] = {}
     for text in words or ():
@@ -50,7 +50,7 @@ def swept_values(arm: Arm, words: Sequence[str] | None, held: Mapping[str, float
         if len(parts) != 3:
             raise UsageError(f"--sweep {text}: write {_RANGE}")
         low, high = number(parts[0], f"--sweep {name}"), number(parts[1], f"--sweep {name}")
-        count = whole_number(parts[2], f"--sweep {name}: count", 1, MOST_SWEEPS)
+        count = whole_number(parts[2], f"--sweep {name}: count", 1, MAX_SWEEPS)
         values_of[name] = [low + (high - low) * i / max(count - 1, 1) for i in range(count)]
     return values_of
 

@@ -98,7 +98,7 @@ def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
 
 
 _NEIGHBOURS = 2.5  # distance [pulses] from the exact value within which `pulses --best` may choose
-_MOST_PULSES = 2**53  # pulses of a goal, at most
+_MAX_PULSES = 2**53  # pulses of a goal, at most
 
 
 @dataclass
@@ -193,7 +193,7 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
 
     if len(counts) != len(arm.motor_gain):
         raise UsageError(f"the answer has {len(counts)} pulses, {arm.name} has {len(arm.motor_gain)} motors")
-    if max(map(abs, counts)) > _MOST_PULSES:
+    if max(map(abs, counts)) > _MAX_PULSES:
         raise UsageError(f"the answer on standard input is damaged: {max(counts, key=abs)} pulses")
     meant = armkin.joints(arm, counts)
     pulse_error = np.abs(meant - q) / resolution(arm)

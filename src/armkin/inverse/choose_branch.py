@@ -35,10 +35,10 @@ from armkin.model import limits, units
 from armkin.model.arm import Arm
 from armkin.model.lock_joints import unlock
 
-MOST_SWEEPS = 10_000  # combinations of swept values that are tried
+MAX_SWEEPS = 10_000  # combinations of swept values that are tried
 _RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first
 _THIN = 20  # branches of one target that are kept before those that no answer shows are dropped
-_MOST_ANSWERS = 16_384  # answers, of 6.5 kB each, of one target and one swept value that are kept at once
+_MAX_ANSWERS = 16_384  # answers, of 6.5 kB each, of one target and one swept value that are kept at once
 
 
 @dataclass(frozen=True)
@@ -106,11 +106,11 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     rounding: (N,) of the targets, see `armkin.ik`.
 
     Raises UsageError if the task does not fit the arm, no branch has the name asked for, or more than
-    MOST_SWEEPS combinations are swept.
+    MAX_SWEEPS combinations are swept.
     """
-    if (count := combinations(request)) > MOST_SWEEPS:
-        message = f"{count} combinations of swept values; at most {MOST_SWEEPS} are tried"
-        raise UsageError(message, combinations=count, most=MOST_SWEEPS)
+    if (count := combinations(request)) > MAX_SWEEPS:
+        message = f"{count} combinations of swept values; at most {MAX_SWEEPS} are tried"
+        raise UsageError(message, combinations=count, most=MAX_SWEEPS)
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     collected = [_SweptTarget() for _ in targets]
@@ -135,7 +135,7 @@ def combinations(request: Request) -> int:
 
 def most_targets(request: Request) -> int:
     """How many targets to solve at once, so that the branches of all swept values stay within 100 MB."""
-    return max(_MOST_ANSWERS // combinations(request), 1) if request.every else _MOST_ANSWERS
+    return max(_MAX_ANSWERS // combinations(request), 1) if request.every else _MAX_ANSWERS
 
 
 def locked_arm(request: Request) -> Arm:

@@ -20,7 +20,7 @@ from armkin.motors import motor_accel, pulses, undriven_joints
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-LEAST_SHARE = 1e-4  # least share of a joint's max_speed or max_accel
+MIN_SHARE = 1e-4  # least share of a joint's max_speed or max_accel
 
 
 def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
@@ -48,9 +48,9 @@ def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: f
 
 
 def check_share(name: str, value: float) -> None:
-    """Raise UsageError for a fraction of a limit that is no plan's: below LEAST_SHARE, or above 1."""
-    if not LEAST_SHARE <= value <= 1:
-        low = 100 * LEAST_SHARE
+    """Raise UsageError for a fraction of a limit that is no plan's: below MIN_SHARE, or above 1."""
+    if not MIN_SHARE <= value <= 1:
+        low = 100 * MIN_SHARE
         raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from {low:g} to 100 percent")
 
 

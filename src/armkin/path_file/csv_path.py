@@ -9,7 +9,7 @@ from itertools import islice
 from typing import Any
 
 from armkin.errors import PathFileError
-from armkin.path_file.path_keys import LEAST_TOOL_SPEED, MAX_NUMBER, MOST_POINTS, Move, PathFile, Source
+from armkin.path_file.path_keys import MAX_NUMBER, MAX_POINTS, MIN_TOOL_SPEED, Move, PathFile, Source
 
 _OPTIONS = ("blend", "tool_speed")
 _TARGETS = ("x", "y", "z", "theta", "phi", "roll", "pitch", "yaw", "ax", "ay", "az")
@@ -36,10 +36,8 @@ def parse_csv(raw: bytes, name: str) -> PathFile:
     if not rows:
         raise PathFileError(f"{name}: has no rows: a header such as x,y,z and one row a corner", file=name)
     header, rows = _header_and_rows(rows, name)
-    if len(rows) > MOST_POINTS:
-        raise PathFileError(
-            f"{name}: has more than {MOST_POINTS} rows, and a path no more: give it in parts", file=name
-        )
+    if len(rows) > MAX_POINTS:
+        raise PathFileError(f"{name}: has more than {MAX_POINTS} rows, and a path no more: give it in parts", file=name)
     if not rows:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
     moves = [_row_to_move(header, row, first=not k, line=(name, number)) for k, (number, row) in enumerate(rows)]
@@ -82,7 +80,7 @@ def _filled_rows(text: str, name: str) -> list[Row]:
         if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
     )
     try:
-        return list(islice(filled, MOST_POINTS + 2))
+        return list(islice(filled, MAX_POINTS + 2))
     except csv.Error as error:
         line = lines.line_num
         raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None
@@ -109,9 +107,9 @@ def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str
 def _row_to_move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
     named = _numbers_by_column(header, row, line)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
-    if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < LEAST_TOOL_SPEED:
+    if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < MIN_TOOL_SPEED:
         raise PathFileError(
-            f"{line[0]}:{line[1]}: blend is at least 0, tool_speed at least {LEAST_TOOL_SPEED:g} mm/s", file=line[0]
+            f"{line[0]}:{line[1]}: blend is at least 0, tool_speed at least {MIN_TOOL_SPEED:g} mm/s", file=line[0]
         )
     if header and not set(named) & set(_TARGETS):
         return Move.model_construct(None, joint=named, **extra)

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from armkin.errors import PathFileError
-from armkin.path_file.path_keys import LEAST_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
+from armkin.path_file.path_keys import MIN_TOOL_SPEED, Arc, Circle, Move, PathFile, Source
 from armkin.robot_file.robot_keys import cross
 
 Point = tuple[float, float, float]
@@ -72,7 +72,7 @@ class Pen:
     def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
-            speed_key = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+            speed_key = {} if speed is None else {"tool_speed": max(speed, MIN_TOOL_SPEED)}
             opened: list[Sequence[float]] = []
             self._add(Move.model_construct({"polyline"}, polyline=opened, **speed_key), line)
             self._open, self._speed = opened, speed
@@ -85,7 +85,7 @@ class Pen:
     ) -> None:
         """An arc or helix from a to b about an axis, by an angle [rad] (positive: right-handed)."""
         self.points += 1
-        speed_key = {} if speed is None else {"tool_speed": max(speed, LEAST_TOOL_SPEED)}
+        speed_key = {} if speed is None else {"tool_speed": max(speed, MIN_TOOL_SPEED)}
         rise = sum(n * (y - x) for n, x, y in zip(normal, a, b, strict=True))
         radial = [x - c for x, c in zip(a, centre, strict=True)]
         lift = sum(n * o for n, o in zip(normal, radial, strict=True))

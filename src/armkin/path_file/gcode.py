@@ -12,7 +12,7 @@ from armkin.errors import PathFileError
 from armkin.path_file import gcode_arcs
 from armkin.path_file.drawing import MAX_COORDINATE, DrawingOptions, Pen, Placing, Point
 from armkin.path_file.gcode_words import PLAIN, Words, line_error, lines, words_of
-from armkin.path_file.path_keys import MOST_POINTS, PathFile
+from armkin.path_file.path_keys import MAX_POINTS, PathFile
 
 AXES = "XYZ"
 INCH = 25.4  # inch [mm]
@@ -73,8 +73,8 @@ class _Program:
     def run(self, program: Iterable[tuple[int, str]]) -> None:
         """Read lines until the program's end."""
         for self.line, text in program:
-            if self.pen.points > MOST_POINTS:
-                raise self._error(f"is behind {MOST_POINTS} points, and a path has no more: give the program in parts")
+            if self.pen.points > MAX_POINTS:
+                raise self._error(f"is behind {MAX_POINTS} points, and a path has no more: give the program in parts")
             plain = PLAIN.fullmatch(text)
             if plain is not None and self._plain_line(*plain.groups()):
                 continue

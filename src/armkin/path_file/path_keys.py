@@ -14,12 +14,12 @@ MAX_NUMBER = 1e7  # size of a number, at most
 Number = Annotated[float, Field(ge=-MAX_NUMBER, le=MAX_NUMBER)]
 Values = Annotated[list[Number], Field(min_length=1, max_length=16)]
 Triple = Annotated[list[Number], Field(min_length=2, max_length=3)]
-MOST_POINTS = 120_000  # points of a polyline or a spline, and of a CSV file, at most
-LEAST_PERCENT = 0.01  # share [%] of a speed, at least
-LEAST_TOOL_SPEED = 1e-3  # speed [mm/s] of the tool, at least
-LEAST_TOLERANCE = 1e-6  # tolerance [mm], at least
-Percent = Annotated[float, Field(ge=LEAST_PERCENT, le=100)]
-Speed = Annotated[float, Field(ge=LEAST_TOOL_SPEED, le=1e6)]
+MAX_POINTS = 120_000  # points of a polyline or a spline, and of a CSV file, at most
+MIN_PERCENT = 0.01  # share [%] of a speed, at least
+MIN_TOOL_SPEED = 1e-3  # speed [mm/s] of the tool, at least
+MIN_TOLERANCE = 1e-6  # tolerance [mm], at least
+Percent = Annotated[float, Field(ge=MIN_PERCENT, le=100)]
+Speed = Annotated[float, Field(ge=MIN_TOOL_SPEED, le=1e6)]
 Joints = Values | dict[str, Number] | str
 
 KINDS = ("joint", "point", "line", "polyline", "arc", "circle", "spline", "offset", "wait", "grip")
@@ -90,7 +90,7 @@ class Move(_Model):
     polyline: Annotated[list[Values], Field(min_length=1)] | None = Field(None, description="Lines through targets.")
     arc: Arc | None = Field(None, description="An arc through via, to to.")
     circle: Circle | None = Field(None, description="A circle or helix.")
-    spline: Annotated[list[Values], Field(min_length=1, max_length=MOST_POINTS)] | None = Field(
+    spline: Annotated[list[Values], Field(min_length=1, max_length=MAX_POINTS)] | None = Field(
         None, description="A smooth curve through targets."
     )
     offset: Offset | None = Field(None, description="A line by an offset.")
@@ -138,7 +138,7 @@ class PathFile(_Model):
 
     robot: str | None = Field(None, description="Name or file of the robot.")
     task: str | None = Field(None, description="What targets prescribe; by default the arm's task.")
-    tolerance: Annotated[float, Field(ge=LEAST_TOLERANCE, le=1000)] | None = Field(
+    tolerance: Annotated[float, Field(ge=MIN_TOLERANCE, le=1000)] | None = Field(
         None, description="mm between plan and path; 0.05 by default."
     )
     turn_tolerance: Annotated[float, Field(ge=0, le=10)] | None = Field(

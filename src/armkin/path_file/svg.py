@@ -8,7 +8,7 @@ from xml.parsers import expat
 
 from armkin.errors import PathFileError
 from armkin.path_file.drawing import MAX_COORDINATE, DrawingOptions, Pen, Placing
-from armkin.path_file.path_keys import MOST_POINTS, PathFile
+from armkin.path_file.path_keys import MAX_POINTS, PathFile
 from armkin.path_file.svg_shapes import (
     SHAPES,
     Matrix,
@@ -210,8 +210,8 @@ class _Drawer:
 
     def _draw_stroke(self, element: _Element, stroke: list[Point]) -> None:
         self.points += len(stroke)
-        if self.points > MOST_POINTS:
-            raise self._error(element, f"is beyond {MOST_POINTS} points: give the drawing in parts")
+        if self.points > MAX_POINTS:
+            raise self._error(element, f"is beyond {MAX_POINTS} points: give the drawing in parts")
         if not all(abs(x) <= MAX_COORDINATE for p in stroke for x in p):
             raise self._error(element, f"is farther away than {MAX_COORDINATE:g} mm")
         line, (x, y) = element.line, stroke[0]

@@ -335,9 +335,9 @@ def _draw_arc(pen: _Outline, v: list[float]) -> None:
     cos, sin = math.cos(turned), math.sin(turned)
     dx, dy = (x1 - x2) / 2, (y1 - y2) / 2
     x, y = cos * dx + sin * dy, -sin * dx + cos * dy
-    grown = (x / rx) ** 2 + (y / ry) ** 2
-    if grown > 1:
-        rx, ry = rx * math.sqrt(grown), ry * math.sqrt(grown)
+    scale = (x / rx) ** 2 + (y / ry) ** 2
+    if scale > 1:
+        rx, ry = rx * math.sqrt(scale), ry * math.sqrt(scale)
     below = rx * rx * y * y + ry * ry * x * x
     root = math.sqrt(max(rx * rx * ry * ry - below, 0.0) / below) * (-1 if large == sweep else 1)
     cx, cy = root * rx * y / ry, -root * ry * x / rx

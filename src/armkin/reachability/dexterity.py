@@ -16,7 +16,7 @@ from armkin.reachability.volume import tip_freedoms
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_MOST_MOTORS = 14  # motors, at most, of an arm: 8,192 combinations of signs a pose
+_MAX_MOTORS = 14  # motors, at most, of an arm: 8,192 combinations of signs a pose
 MEASURES = ("manipulability", "step_error")
 
 
@@ -30,12 +30,12 @@ def measure_function(arm: Arm, name: str) -> Callable[[Array], Array]:
     eq. 13), a power of mm; of an arm that moves in a plane, within that plane.
     """
     if name == "step_error":
-        if len(arm.motor_gain) > _MOST_MOTORS:
+        if len(arm.motor_gain) > _MAX_MOTORS:
             raise UsageError(
                 f"{arm.name} has {len(arm.motor_gain)} motors: the worst of all their roundings is searched for up to "
-                f"{_MOST_MOTORS}",
+                f"{_MAX_MOTORS}",
                 motors=len(arm.motor_gain),
-                most=_MOST_MOTORS,
+                most=_MAX_MOTORS,
             )
         half = 0.5 * joints_per_pulse(arm)
         return lambda q: _longest_sum(jacobian(arm, q)[:, :3] @ half)

@@ -43,7 +43,7 @@ _LINE = 1 << 14  # cells of a planar arm's section, which is a line
 _STRETCHES = 64  # stretches along the sweep, at most
 _UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples that vary them
 _CHUNK = 1 << 16  # samples of a chunk
-_LEAST_CHUNK = 1 << 11  # samples of a chunk, at least
+_MIN_CHUNK = 1 << 11  # samples of a chunk, at least
 _ALL = 5_000  # samples of a survey from which on its volume is worth the whole effort
 _POOL = 1 << 14  # poses that are varied
 _OVERSHOOT = 0.04  # share of the range: samples beyond a limit are set on it
@@ -75,7 +75,7 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     section = _Section(arm, normal)
     rng = np.random.default_rng(seed)
     look = _Cells(section, *section.outer_corners(), 64)
-    chunk = max(_LEAST_CHUNK, min(_CHUNK, _CHUNK * samples // _ALL))
+    chunk = max(_MIN_CHUNK, min(_CHUNK, _CHUNK * samples // _ALL))
     _fill_cells(look, rng, 2, 2, chunk)
     margin = _MARGIN * (look.most - look.least)
     low, high = look.least - margin, look.most + margin

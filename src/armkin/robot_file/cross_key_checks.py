@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Board, Drive, Gripper, Joint, Motor, RobotKeys, Screw
 
 _PITCH_TASKS = ("xyz_pitch", "xyz_pitch_roll")
-_LEAST_WEIGHT = 1e-6  # weight, at least, of a joint on a motor: less would divide by nothing
+_MIN_WEIGHT = 1e-6  # weight, at least, of a joint on a motor: less would divide by nothing
 # A printed table rounds to four digits or so: 0.7071 is a unit vector's component, 0.7 is not.
 _ROUNDING = 1e-3
 
@@ -199,7 +199,7 @@ def _check_weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
     for name, weight in motor.joints.items():
         if name not in types:
             yield ("joints", name), f"there is no joint {name}; the joints are {', '.join(types)}"
-        if abs(weight) < _LEAST_WEIGHT:
+        if abs(weight) < _MIN_WEIGHT:
             yield ("joints", name), f"weight {weight:g} does nothing; leave {name} out"
     turned = {types[name] for name in motor.joints if name in types}
     if motor.lead is not None and "revolute" in turned:

@@ -8,7 +8,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware.segments.remaining_plan import left_of
-from armkin.board.firmware.streaming import LEAD_BAD, LEAD_MOST, motion_batches, ramp_pieces, seconds_of, stream_frames
+from armkin.board.firmware.streaming import LEAD_BAD, MAX_LEAD, motion_batches, ramp_pieces, seconds_of, stream_frames
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.motion_frame import MotionFrame
 from armkin.board.firmware.wire.protocol import Error, Status
@@ -84,13 +84,13 @@ def carry_out(
             return stream_frames(session, run.frames(plans_left, least), run.report_progress), run.end
         except DeviceError as error:
             dry = error.error == Error.DRY
-            left = run.under_way.remaining_plan(session, axes, lay, first=least < LEAD_MOST) if dry else None
+            left = run.under_way.remaining_plan(session, axes, lay, first=least < MAX_LEAD) if dry else None
             if left is None:
                 raise
         session.reopen()
         run.begin_anew(left[1])
         # a line that has turned out bad gets the lead of a bad line, then four times that, and at last the longest
-        least = min(max(LEAD_BAD, 4 * least), LEAD_MOST) if session.line.damaged else LEAD_MOST
+        least = min(max(LEAD_BAD, 4 * least), MAX_LEAD) if session.line.damaged else MAX_LEAD
         plans_left = chain(left[0], plans_left)
 
 
@@ -148,7 +148,7 @@ def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: in
             if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, count, clock) > _BEGINNING:
                 raise
         session.reopen()
-        least = LEAD_MOST
+        least = MAX_LEAD
     return session.status()
 
 

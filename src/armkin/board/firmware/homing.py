@@ -194,10 +194,10 @@ def _coupled_groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
         group = {min(left)}
         while True:
             motors = np.abs(arm.motor_gain[:, sorted(group)]).sum(axis=1) > 0
-            grown = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
-            if grown == group:
+            coupled = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
+            if coupled == group:
                 break
-            group = grown
+            group = coupled
         groups.append(sorted(group))
         left -= group
     return groups

@@ -21,14 +21,14 @@ if TYPE_CHECKING:
     from armkin.board.firmware.wire.session import Session
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
-_LEAD, LEAD_MOST, LEAD_BAD = 0.0015, 0.6, 0.05
+_LEAD, MAX_LEAD, LEAD_BAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor and lead [s]: a busy computer's next turn is not known
 _TICK = 20_000  # length [cycles], at most, of a tick of that pause
 _BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
 _MARGIN, _SPARE = 30, 0.002  # share and time [s]: a queue is dry below 1 / 32 and 2 ms more than the time to a stop
 _SLOW_STOP = 0.024  # time to a stop [s] from which on a queue can be dry
 _QUEUE_RATE = 1 + 33 / 32  # motion [s] that each second since rest wants in the queue
-_UNHEARD_MOST = 0.045  # length [s] of a segment before the first step, at most, in which the arm may wait for its queue
+_MAX_UNHEARD = 0.045  # length [s] of a segment before the first step, at most, in which the arm may wait for its queue
 _INTERVAL = 50_000  # interval [cycles] of a tick, at most
 _SEEN = 64  # segments of a beginning whose way to the board is reckoned: both ramps of a short move
 # Segments of a motion's first frames: a short one is there soon, those behind it last a while.
@@ -123,7 +123,7 @@ def lead_time(
     """
     busy = next((seconds for load, seconds in _LEAD_BUSY if _processor_load(session) > load), 0.0)
     bad = LEAD_BAD if session.line.damaged else 0.0
-    return max(least, busy, bad, min(_LEAD + _lateness(session, frames, unheard), LEAD_MOST))
+    return max(least, busy, bad, min(_LEAD + _lateness(session, frames, unheard), MAX_LEAD))
 
 
 def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
@@ -239,7 +239,7 @@ def _is_unheard(first: Segment) -> bool:
 def delay_segment(first: Segment, pause: float, clock: int) -> Segment | None:
     """The first segment of a motion, `pause` seconds longer for one in front of it; None where that would be felt."""
     interval = first.interval + math.ceil(pause * clock / first.ticks)
-    fits = interval <= _INTERVAL and first.ticks * interval < _UNHEARD_MOST * clock
+    fits = interval <= _INTERVAL and first.ticks * interval < _MAX_UNHEARD * clock
     return replace(first, interval=interval) if fits and _is_unheard(first) else None
 
 

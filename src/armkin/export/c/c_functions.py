@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from armkin import forward
 from armkin.export.c import arm_formulas
 from armkin.formula import c_and_js_code, recording
-from armkin.inverse.closed.subproblems import DOUBLE, SINGLE, recorded_for
+from armkin.inverse.closed.subproblems import IN_DOUBLE, IN_SINGLE, recorded_for
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
@@ -32,7 +32,7 @@ def candidates_code(
     n = arm.n
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(arm_formulas.goal_size(task))]
     declared += _preferred_inputs(arm) if prefer else []
-    with recorded_for(SINGLE if single else DOUBLE):
+    with recorded_for(IN_SINGLE if single else IN_DOUBLE):
         recorded = arm_formulas.record_candidates(arm, task, geometry, prefer)
     code = c_and_js_code.write_code(recorded, [name for name, _ in declared], _language(single))
     outputs = arm_formulas.by_branch(recorded, code)

@@ -244,8 +244,8 @@ def _descend_by_damped_steps(arm: Arm, task: Task, q: Array, target: Array, step
         size = np.abs(trial - q[active]).max(axis=1)
         q[active[better]] = trial[better]
         cost[active[better]] = new_cost[better]
-        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, tol.LEAST_DAMPING), damping[active] * 6.0)
-        little = gained <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.LEAST_COST)
+        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, tol.MIN_DAMPING), damping[active] * 6.0)
+        little = gained <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.MIN_COST)
         idle = better & little & (size < tol.LAST_STEP)
         ended = idle | (damping[active] > 1e8)
         active = active[~ended]

@@ -59,7 +59,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     start = (spot[rows, None] + OTHER_SIDE * unit * np.concatenate([ways, -ways], axis=1)).reshape(-1, n)
     goal = np.repeat(target, MAX_PLACES, axis=0)[np.repeat(rows, 8)]
     landed, size = newton.correct(arm, task, start, goal, steps=10)
-    # a posture that falls back to where it began lies on both self-motions, nearly, and tells of neither
+    # A posture that is corrected to where it began lies on both self-motions, nearly, and tells of neither.
     back = np.abs(newton.difference(arm, landed, np.repeat(spot[rows], 8, axis=0))).max(axis=1) < 0.5 * OTHER_SIDE
     postures[rows] = np.where((back | (size > tol.SEED))[:, None], np.nan, landed).reshape(-1, 8, n)
     return postures.reshape(N, -1, n)

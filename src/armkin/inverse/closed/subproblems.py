@@ -40,10 +40,10 @@ class Precision(NamedTuple):
 
 
 ULPS = 128 * 2.0**-23  # relative rounding of a float: a pose of six joints is off by ten to a hundred units
-DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
-SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)  # thresholds in single precision
+IN_DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
+IN_SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)  # thresholds in single precision
 
-_current = ContextVar("precision", default=DOUBLE)
+_current = ContextVar("precision", default=IN_DOUBLE)
 
 
 def precision() -> Precision:

@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.rotation import inverse, shrink_translations
 
-NO_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
+UNIT_LENGTH = 300.0  # unit [mm] of a chain whose links have no length of their own
 _X = 5  # index of the link of the loop that carries the pose
 
 
@@ -68,7 +68,7 @@ def close_loop(link: Array, prismatic: Bool) -> Loop:
         moved[i, :3, 3] += moved[i, :3, :3] @ move
         moved[i + 1, :3, 3] -= move
     size = float(np.linalg.norm(moved[1:6, :3, 3], axis=1).sum()) / 3
-    length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else NO_LENGTH
+    length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else UNIT_LENGTH
     moved = shrink_translations(moved, length)
     return Loop(np.array(prismatic, dtype=np.bool_), moved[0], moved[1:6], moved[6], length)
 

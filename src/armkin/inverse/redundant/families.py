@@ -40,7 +40,7 @@ from armkin.model.limits import outside_limits
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 256  # targets whose arm angles are worked on together
 TRACED = 250  # targets whose curves are traced together
-FREE = np.deg2rad(0.1)  # step [rad] of the parameter between postures that are asked whether they are free
+FREE_STEP = np.deg2rad(0.1)  # step [rad] of the parameter between postures that are asked whether they are free
 
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
 # `complete` (N,), and whether no joint moves by REACH along any, `short` (N,); `steps` of the golden section.
@@ -265,11 +265,11 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
 
 
 def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
-    """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE`; where there is none, q as it is."""
+    """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE_STEP`; where there is none, q as it is."""
     freed, pieces = q.copy(), curves.pieces
     for p in np.flatnonzero(pieces.legal & ~hits_nothing(arm, q)):
         a, b = pieces.first[p], pieces.last[p]
-        t = np.linspace(a, b, max(int((b - a) / FREE) + 2, 2))[1:-1]
+        t = np.linspace(a, b, max(int((b - a) / FREE_STEP) + 2, 2))[1:-1]
         postures, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
         good = legal & hits_nothing(arm, np.nan_to_num(postures))
         if good.any():

@@ -30,8 +30,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     open_ = ~at.known & at.followed
     inside = members(at, rows, newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
-    grown = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    open_ |= at.known & at.manifold & ~ended & (grown > tol.CLOSED)
+    residual = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
+    open_ |= at.known & at.manifold & ~ended & (residual > tol.CLOSED)
     left = np.flatnonzero(open_ & (at.second > tol.HIGH))
     if not len(left):
         return inside, ended, ended & at.alone, at.joints

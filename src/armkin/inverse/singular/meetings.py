@@ -81,8 +81,8 @@ def _sizes(forms: Array, products: Array, far: float) -> tuple[Array, Array]:
 
     As far [rad] from the next of these directions a form differs by twice its largest value at most.
     """
-    grown = forms @ products  # (m, k, P)
-    size = np.sqrt((grown * grown).sum(axis=1))
+    values = forms @ products  # (m, k, P)
+    size = np.sqrt((values * values).sum(axis=1))
     return size, ALL_ROUND + 2.0 * far * size.max(axis=1)
 
 
@@ -136,7 +136,7 @@ def _steps_out(
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
     most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
-    meetings (M,) all pushes fall back to.
+    meetings (M,) all pushes end at.
     """
     decided, meeting, push = _tangents(arm, task, q, linear, nullity, target)
     rests, open_ = decided.copy(), np.flatnonzero(~decided)
@@ -148,11 +148,11 @@ def _steps_out(
         more, further = null_directions(arm.n, linear.V[rows], nullity[rows])
         meeting, push = np.concatenate([meeting, rows[more]]), np.concatenate([push, further])
     once = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
-    postures, size, grown = (np.concatenate([a, b[three]]) for a, b in zip(once, pushed, strict=True))
+    postures, size, growth = (np.concatenate([a, b[three]]) for a, b in zip(once, pushed, strict=True))
     meeting = np.concatenate([meeting, open_[row[three]]])
     if not len(meeting):
         return meeting, postures, rests
-    rests[meeting[grown <= tol.GROWTH]] = False
+    rests[meeting[growth <= tol.GROWTH]] = False
     unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
     good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))
     good = good[newton.null_space(arm, task, postures[good], target[meeting[good]])[2] == 1]

@@ -182,18 +182,18 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     unit = radian_or_reach(arm)
     moving, joints = np.zeros(len(q), bool), np.zeros(q.shape, bool)
     row, push = null_directions(arm.n, V, nullity)
-    # The first pass decides which candidates do not move, most: their residual exceeds `GROWTH`. Where several
-    # directions are lost, its step is long: a short one would be drawn back to the meeting.
+    # The first pass decides which candidates do not move, most: their residual grows by more than `GROWTH`. Where
+    # several directions are lost, its step is long: a short one would be drawn back to the meeting.
     several = nullity[row] > 1
     first = np.where(several, 10 * STEP, STEP)
-    _, _, residual = push_along(arm, task, q[row], first, push, target[row])
-    going = np.flatnonzero(residual <= tol.GROWTH)
+    _, _, growth = push_along(arm, task, q[row], first, push, target[row])
+    going = np.flatnonzero(growth <= tol.GROWTH)
     # The second pass decides this of those that lose one direction and miss by more than rounding, by a longer step.
-    alone = ~several[going] & (residual[going] * first[going] > tol.CLOSED)
+    alone = ~several[going] & (growth[going] * first[going] > tol.CLOSED)
     if alone.any():
         tried = going[alone]
-        _, _, residual = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
-        alone[alone] = ~(residual <= tol.GROWTH)
+        _, _, growth = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
+        alone[alone] = ~(growth <= tol.GROWTH)
         going = going[~alone]
     if not len(going):
         return moving, joints
@@ -204,10 +204,10 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     start = q[row] + ways * push * unit
     landed, size = pull_back(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
     away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
-    residual = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
-    short, long = (residual <= tol.GROWTH * STEPS) & _equally_long(away, push)
+    growth = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
+    short, long = (growth <= tol.GROWTH * STEPS) & _equally_long(away, push)
     # A residual above rounding must stay small up to the long step: a fold's first tenth of a radian shows nothing.
-    along = (short & ((residual[0] <= tol.CLOSED) | long)) | (long & several)
+    along = (short & ((growth[0] <= tol.CLOSED) | long)) | (long & several)
     np.logical_or.at(moving, row, along)
     np.logical_or.at(joints, row, along[:, None] & _moving_joints(away, long))
     return moving, joints

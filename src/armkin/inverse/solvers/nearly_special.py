@@ -227,7 +227,7 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
     arm, task = source.arm, source.task
     seed, miss, doubt = source.rows(target)
     N, B, n = seed.shape
-    weak = min(tol.STEADY_VALUE, 1.5 * np.sqrt(gap)) + tol.AT_LEAST
+    weak = min(tol.STEADY_VALUE, 1.5 * np.sqrt(gap)) + tol.MIN_VALUE
     limit = 9.0 * gaps[:, None]  # bound of a squared residual: a pair that just misses being real misses by a root
     real = miss < limit
     for moved in targets_around(arm, task, target, AROUND_FACTOR * gaps):

@@ -30,8 +30,8 @@ from armkin.model.units import radian_or_reach
 
 AROUND_FACTOR = 10.0  # distance, in distances from the class, by which a target is moved to see if its branches stay
 # square of half of what lies between complex roots, up to which they may be one real root
-TOUCHING = tol.APART_ROOTS**2
-MOVED = 0.3  # distance [rad, reaches] of a pair from the class's, at most
+GAP_SQUARE = tol.APART_ROOTS**2
+PAIR_SHIFT = 0.3  # distance [rad, reaches] of a pair from the class's, at most
 STEPS = 8  # steps of Newton's method for a pair
 MAX_STEP = 0.3  # length [rad, reaches], at most, of each step for a pair
 
@@ -82,15 +82,15 @@ def settle_pairs(source: Recorded, gaps: Array, target: Array) -> tuple[Rows, Bo
     apart = newton.difference(arm, seed[row, first], seed[row, second]) * radian_or_reach(arm)
     middle = seed[row, first] - 0.5 * apart
     pair = _find_pairs(arm, task, middle, target[row])
-    accepted = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < MOVED)
+    accepted = pair.found & (newton.wrapped_distance(arm, pair.middle, middle) < PAIR_SHIFT)
     open_[row[~accepted]] = True
     sense = np.where(_keep_sense(source, (row, first, second), gaps, target, pair.way), 1.0, -1.0)[:, None]
     for place, side in ((first, sense), (second, -sense)):
         guess = pair.middle + side * pair.way
-        guesses[row, place] = np.where((pair.square < -TOUCHING)[:, None], np.nan, guess)
+        guesses[row, place] = np.where((pair.square < -GAP_SQUARE)[:, None], np.nan, guess)
         better, size = newton.correct(arm, task, guess, target[row])
         q[row, place] = np.where((accepted & (pair.square > 0.0) & (size <= tol.ANSWERED))[:, None], better, np.nan)
-        doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -TOUCHING)
+        doubt[row] |= np.isnan(q[row, place, 0]) & (pair.square > -GAP_SQUARE)
     doubt |= _merged_branches(arm, q).any(axis=1)
     return Rows(q, doubt & ~open_, complete, None, guesses), open_
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 TURN = 2 * np.pi  # whole turn [rad]
-LEAST_LEVER = 30.0  # lever [mm], at least, of a turn that does not move the tip: the tool's direction counts, too
+MIN_LEVER = 30.0  # lever [mm], at least, of a turn that does not move the tip: the tool's direction counts, too
 
 
 def levers(arm: Arm) -> Array:
@@ -29,7 +29,7 @@ def levers(arm: Arm) -> Array:
             if arm.prismatic[first]:
                 bounds[j, k] = 0.0
             else:
-                bounds[j, k] = 1.0 if arm.prismatic[later] else max(beyond[later], LEAST_LEVER)
+                bounds[j, k] = 1.0 if arm.prismatic[later] else max(beyond[later], MIN_LEVER)
     return np.asarray(bounds * np.outer(arm.ratio, arm.ratio))
 
 

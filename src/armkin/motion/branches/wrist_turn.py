@@ -20,7 +20,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
-from armkin.motion.branches.joint_steps import LEAST_LEVER, joint_change
+from armkin.motion.branches.joint_steps import MIN_LEVER, joint_change
 from armkin.motion.branches.solve_on_route import correct_to_route
 from armkin.motion.branches.wrist_window import Window, add_detours
 from armkin.motion.tool_path.route import Detour
@@ -66,7 +66,7 @@ def add_wrist_chains(
     turn: [rad] by which the tool may be turned for it, tip_offset: [mm] that the tip may go.
     """
     s, all_chains, latest = columns.s, list(chains), list(chains)
-    near = _NEAR_DISTANCE * max(np.sin(turn), tip_offset / LEAST_LEVER)
+    near = _NEAR_DISTANCE * max(np.sin(turn), tip_offset / MIN_LEVER)
     for _ in range(_MAX_SINGULARITIES):
         joined_chains = []
         for c in latest:

@@ -70,11 +70,11 @@ def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
 
 def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
     """How fast and how exactly a path is moved along. Raises UsageError for what is out of range."""
-    from armkin.path_file.path_keys import LEAST_TOLERANCE, LEAST_TOOL_SPEED
+    from armkin.path_file.path_keys import MIN_TOLERANCE, MIN_TOOL_SPEED
 
     check_share("speed", request.speed)
     check_share("accel", request.accel)
-    for name, least, unit in (("tool_speed", LEAST_TOOL_SPEED, "mm/s"), ("tolerance", LEAST_TOLERANCE, "mm")):
+    for name, least, unit in (("tool_speed", MIN_TOOL_SPEED, "mm/s"), ("tolerance", MIN_TOLERANCE, "mm")):
         value = getattr(request, name)
         if value is not None and not least <= value < np.inf:
             raise UsageError(f"{name} {value:g} is not possible; it is at least {least:g} {unit}")

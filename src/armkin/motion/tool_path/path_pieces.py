@@ -26,7 +26,7 @@ from armkin.motion.tool_path.b_spline import solve_banded
 PER_RADIAN = 30.0  # lever [mm/rad] at which a turn of the tool counts as a way
 MIN_LENGTH = 1e-9  # length [mm] below which a piece is none
 _GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
-_TABLE, _LEAST_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
+_TABLE, _MIN_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
 _TABLES = 20_000  # intervals of all spans' tables
 _EVEN_SLOPE, _LENGTH_ERROR = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
 
@@ -340,12 +340,12 @@ def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale:
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
     needed = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
     even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * most
-    return np.where(even, 1, np.clip(needed, _LEAST_TABLE, _table_intervals(len(u) - 1))).astype(np.intp)
+    return np.where(even, 1, np.clip(needed, _MIN_TABLE, _table_intervals(len(u) - 1))).astype(np.intp)
 
 
 def _table_intervals(spans: int) -> int:
     """Of the table of lengths, for each of so many spans."""
-    return int(np.clip(_TABLES // max(spans, 1), _LEAST_TABLE, _TABLE))
+    return int(np.clip(_TABLES // max(spans, 1), _MIN_TABLE, _TABLE))
 
 
 def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:

@@ -33,7 +33,7 @@ _RATIO = 1.14  # ratio of speeds of a segment in a ramp with fewer segments than
 _RAMP, _SHORT_RAMP, _ROUGH_RAMP = 27, 13, 12  # segments of a ramp at most, see `Pieces`
 _MAX_RATIO = 1.4  # ratio of speeds from which the first segment gets longer: the board takes 5/4 of the acceleration
 _FIRST, _FIRST_ROUGH = 0.003, 0.03  # length [s], at least, of a ramp's first segment; in rough, four times any other
-_FIRST_MOST = 0.1  # length [s], at most, of a ramp's first segment: a board's jump is 5/4 of the acceleration in 50 ms
+_FIRST_MAX = 0.1  # length [s], at most, of a ramp's first segment: a board's jump is 5/4 of the acceleration in 50 ms
 _BEFORE_STEP = 0.96  # share of the time to a motor's first step: until then no motor tells how it got there
 _NO_STEP = 0.49  # part of a step that is left for the rounding of rates
 # Of its time, that such a first segment takes, at once at the speed that 1.2 of the acceleration makes in it; the
@@ -198,7 +198,7 @@ def _ramp_bounds(law: Profile, t0: float, t1: float, accel: float, steps: int, p
     most, shortest = _most_ramp_segments(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
     top = max(v0, v1) / abs(accel)  # [s] from rest at each speed
     first = max(min(v0, v1) / abs(accel), shortest, _to_first_step(law, accel, steps))
-    first = min(max(first, top / _MAX_RATIO**most), _FIRST_MOST)
+    first = min(max(first, top / _MAX_RATIO**most), _FIRST_MAX)
     to_rest = [top]
     if top > first:
         number = min(most, math.ceil(math.log(top / first) / math.log(_RATIO)))
