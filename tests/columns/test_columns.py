@@ -53,7 +53,7 @@ def test_pyarrow_prints_the_bytes_that_python_prints(table: Table, monkeypatch: 
     fast = csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table)
     assert fast == by_python(table, monkeypatch)
     with monkeypatch.context() as patch:
-        patch.setattr(csv_and_json_lines, "BLOCK", 3_333)
+        patch.setattr(csv_and_json_lines, "ROWS", 3_333)
         patch.setattr(csv_and_json_lines, "PYARROW_ROWS", 2_000)
         assert fast == (csv_and_json_lines.to_csv(table), csv_and_json_lines.to_json_lines(table))
     names = ["", 'with, comma and "quote"', "right"]

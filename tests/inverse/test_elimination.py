@@ -325,7 +325,7 @@ def test_a_pose_has_the_same_branches_in_any_batch(monkeypatch: pytest.MonkeyPat
     plan = method.prepare(*arm)
     T = pose_of(arm, random_joints(arm, 600, 15))
     in_one_batch, doubt, *_ = method.solve(plan, T)
-    monkeypatch.setattr(method, "BLOCK", 512)
+    monkeypatch.setattr(method, "BLOCK_POSES", 512)
     together, near_singular, *_ = method.solve(plan, T)
     np.testing.assert_array_equal(np.isnan(together), np.isnan(in_one_batch))
     np.testing.assert_allclose(together, in_one_batch, atol=1e-9)

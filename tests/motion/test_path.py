@@ -133,9 +133,9 @@ def test_branches_do_not_depend_on_the_blocks_they_are_solved_in(
 ) -> None:
     moves = {"moves": [{"point": [390, 80, 300]}, CIRCLE]}
     at_once = armkin.path(three_dof, moves, start=three_dof.home)
-    monkeypatch.setattr("armkin.motion.branches.linked_branches._BLOCK", 64)
-    monkeypatch.setattr("armkin.motion.branches.branch_columns._BLOCK", 64)
-    monkeypatch.setattr("armkin.motion.plan.path_plan._BLOCK", 100)
+    monkeypatch.setattr("armkin.motion.branches.linked_branches._BLOCK_STEPS", 64)
+    monkeypatch.setattr("armkin.motion.branches.branch_columns._BLOCK_SAMPLES", 64)
+    monkeypatch.setattr("armkin.motion.plan.path_plan._BLOCK_TIMES", 100)
     parts = armkin.path(three_dof, moves, start=three_dof.home)
     assert parts.duration == pytest.approx(at_once.duration, rel=1e-12)
     assert [b.carries for b in parts.branches] == [b.carries for b in at_once.branches]

@@ -18,7 +18,7 @@ from armkin.columns.csv_cells import csv_cell
 from armkin.columns.table import Column, Table, Words, row_count, take_rows
 
 PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
-BLOCK = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
+ROWS = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
 
 
 # Prints all rows of a table: between[i] stands before column i, the last one at the end; how words are quoted, and
@@ -43,7 +43,7 @@ def _print_lines(table: Table, between: list[str], quoted: Callable[[Any], str],
     """See `Lines`."""
     count = row_count(table)
     if count >= PYARROW_ROWS and (arrow := _import_arrow()) is not None:
-        parts = (table if count <= BLOCK else take_rows(table, slice(i, i + BLOCK)) for i in range(0, count, BLOCK))
+        parts = (table if count <= ROWS else take_rows(table, slice(i, i + ROWS)) for i in range(0, count, ROWS))
         return b"".join([_print_by_arrow(arrow, block, between, quoted, missing) for block in parts])
     columns = [_column_texts(column, quoted, missing) for column in table.values()]
     if not count:

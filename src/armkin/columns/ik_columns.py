@@ -25,7 +25,7 @@ from armkin.model.lock_joints import unlock
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
 
-BLOCK = 2_048  # targets worked on at once: all their arrays fit the cache
+BLOCK_TARGETS = 2_048  # targets worked on at once: all their arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
 
@@ -61,9 +61,9 @@ def branch_columns(
     names = () if request.branch is None else find_branches(s.names, request.branch)
     parts = [
         _list_branches(
-            request, _Answers(s, slice(i, i + BLOCK), q, within, free, near, names), rows, all_branches, quick
+            request, _Answers(s, slice(i, i + BLOCK_TARGETS), q, within, free, near, names), rows, all_branches, quick
         )
-        for i in range(0, max(len(q), 1), BLOCK)
+        for i in range(0, max(len(q), 1), BLOCK_TARGETS)
     ]
     return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 

@@ -18,7 +18,7 @@ from armkin.inverse.answers.solutions import Solutions
 
 ROOM = 24  # columns that a large result has room for from the start: to enlarge it would take its memory twice
 MOVABLE = 32_000_000  # size [bytes] up to which a result is enlarged by a copy: allocators reuse the memory given back
-BLOCK = 4096  # rows moved at once
+BLOCK_ROWS = 4096  # rows moved at once
 
 
 class Results:
@@ -61,10 +61,10 @@ class Results:
         pairs = zip(narrow_arrays, wide_arrays, (math.nan, False, False, -1), strict=True)
         for narrow, wide, none in pairs:
             # rows move from the end on: each goes to a place that rows behind it have left
-            for start in reversed(range(0, self.N, BLOCK)):
-                rows = narrow[start : start + BLOCK].copy()
-                wide[start : start + BLOCK, :before] = rows
-                wide[start : start + BLOCK, before:] = none
+            for start in reversed(range(0, self.N, BLOCK_ROWS)):
+                rows = narrow[start : start + BLOCK_ROWS].copy()
+                wide[start : start + BLOCK_ROWS, :before] = rows
+                wide[start : start + BLOCK_ROWS, before:] = none
 
     def write(self, rows: slice | NDArray[np.intp], answers: Results | Solutions) -> None:
         """Some rows, which may have more columns than there are."""

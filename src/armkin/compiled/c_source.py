@@ -48,7 +48,7 @@ PARTS = Path(__file__).parent / "parts"
 
 
 LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
-BLOCK = 8  # poses at once of an elimination: a multiple of its vectors' lanes
+POSES = 8  # poses at once of an elimination: a multiple of its vectors' lanes
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_equal_roots", "lanes_pass")
 
 
@@ -90,7 +90,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(BLOCK)  # the elimination has met its own
+            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(POSES)  # the elimination has met its own
         fields |= _task_fields(arm, task, branches, accepted)
         # branches that come in no order are numbered by their places, until `follow` sees a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from armkin.keep_out.clearance import Clearance
     from armkin.model.arm import Arm
 
-BLOCK = 16384  # poses of an elimination whose results are kept in all columns
+BLOCK_POSES = 16384  # poses of an elimination whose results are kept in all columns
 UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
 
 
@@ -357,8 +357,8 @@ class _CompiledTask:
     def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """As `_solve_rows`, for an elimination: block by block, in no more columns than the batch needs."""
         batch = Results(len(target), 0, self.n)
-        for start in range(0, max(len(target), 1), BLOCK):
-            rows = slice(start, min(start + BLOCK, len(target)))
+        for start in range(0, max(len(target), 1), BLOCK_POSES):
+            rows = slice(start, min(start + BLOCK_POSES, len(target)))
             close = near if near.size == self.n else near.reshape(-1, self.n)[rows]
             block = self._solve_rows(target[rows], close, workers, read=read)
             if block is None:

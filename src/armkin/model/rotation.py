@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from armkin.formula.arrays import Array
 
 # Turns z and y over: conjugating a joint's motion with it reverses the joint.
-BLOCK = 2_048  # rows worked on at once: all their arrays fit the cache
+BLOCK_ROWS = 2_048  # rows worked on at once: all their arrays fit the cache
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
@@ -123,8 +123,8 @@ def transforms(xyz: Array, rpy: Array) -> Array:
     """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
     matrices = np.zeros((*xyz.shape[:-1], 4, 4))
     every, place, angles = matrices.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
-    for start in range(0, len(every), BLOCK):
-        block = slice(start, start + BLOCK)
+    for start in range(0, len(every), BLOCK_ROWS):
+        block = slice(start, start + BLOCK_ROWS)
         T = every[block]
         (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(angles[block].T))
         cysp, sysp = cy * sp, sy * sp

@@ -12,7 +12,7 @@ from armkin.robot_file.robot_keys import cross
 
 Point = tuple[float, float, float]
 MAX_COORDINATE = 1e6  # coordinate [mm], at most
-_FULL = 2 * math.pi
+_FULL_TURN = 2 * math.pi  # [rad]
 _THREE_POINTS = 1.6 * math.pi  # angle [rad] beyond which a rounded end beside the start makes them another circle's
 _NO_ARC = 1e-6  # length [mm] below which an arc is none
 
@@ -107,7 +107,7 @@ class Pen:
             self._add(Move.model_construct({"arc"}, arc=made, **speed_key), line)
             return
         direction = self.placing.direction(normal)
-        turns, scale = angle / _FULL, self.placing.scale
+        turns, scale = angle / _FULL_TURN, self.placing.scale
         made_circle = Circle.model_construct(
             centre=self.placing.point(base), normal=direction, turns=turns, rise=rise * scale
         )

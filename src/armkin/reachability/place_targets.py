@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targets and a task
 
 TURNING = ("xy_theta", "xyz_yaw")  # tasks of which an angle turns with the arm
-BLOCK = 8_192  # targets asked together: what is known of them stays in the cache
+BLOCK_TARGETS = 8_192  # targets asked together: what is known of them stays in the cache
 BEYOND_REACH = 1e-6  # distance [reaches] beyond the reach from which on nothing solves a target
 
 
@@ -91,7 +91,7 @@ def reached_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int6
     """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
     if question.values:
         return _greatest_counts(question, positions)
-    at_once = len(positions) if question.by_distance_alone else max(BLOCK // len(question.targets), 1)
+    at_once = len(positions) if question.by_distance_alone else max(BLOCK_TARGETS // len(question.targets), 1)
     blocks = [positions[start : start + at_once] for start in range(0, len(positions), at_once)]
     return np.concatenate([_count_targets(question, block, _legal_yaws(question, block)) for block in blocks])
 
@@ -197,8 +197,8 @@ def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] |
         return None
     legal, open_ = answer
     p, i, k = np.nonzero(open_)
-    for start in range(0, len(p), BLOCK):
-        block = slice(start, start + BLOCK)
+    for start in range(0, len(p), BLOCK_TARGETS):
+        block = slice(start, start + BLOCK_TARGETS)
         beside = _shift_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
         turn = turns[k[block]]
         goals = _turn_targets(question.task, beside, turn, np.cos(turn), np.sin(turn))
@@ -241,7 +241,7 @@ def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array)
     K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
     cosine, sine = np.cos(turns), np.sin(turns)
-    at_once = max(BLOCK // K, 1)
+    at_once = max(BLOCK_TARGETS // K, 1)
     for start in range(0, len(target), at_once):
         block = slice(start, start + at_once)
         m, k = np.nonzero(_within_reach(question, target[block], place[block], turns))

@@ -27,7 +27,7 @@ DEFECTS = 4.0  # bound of a rounded target's error, in defects of its rotation
 HALVES = 12.0  # bound of a rounded target's error, in halves of the last digit of its rotation
 MIN_DIGITS = 5  # digits, at least, of a matrix's entries: one of fewer is no rotation to that many
 PRINTED = 6  # digits, at least, that a position is printed with; zeros at its end show fewer
-BLOCK = 2_048  # rows worked on at once: all their arrays fit the cache
+ROWS = 2_048  # rows worked on at once: all their arrays fit the cache
 MIN_DECIMALS, MAX_DECIMALS = 3, 12  # printed decimals that count as rounded, and as exact
 
 
@@ -123,7 +123,7 @@ def printed_rounding(units: Sequence[str], values: Array, reach: float, decimals
     values = np.asarray(values, float).reshape(-1, len(units))
     if decimals is None:  # all numbers of a row have as many: there are no more sizes than decimals
         sizes = printed_rounding(units, values[:0], reach, np.repeat(np.arange(MAX_DECIMALS)[:, None], len(units), 1))
-        blocks = [_needed_decimals(values[start : start + BLOCK]).max(axis=1) for start in range(0, len(values), BLOCK)]
+        blocks = [_needed_decimals(values[start : start + ROWS]).max(axis=1) for start in range(0, len(values), ROWS)]
         return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
     halves = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
     angles = np.array([unit == "deg" for unit in units])

@@ -54,7 +54,7 @@ __all__ = ["Branches", "Elimination", "left_open", "prepare", "solve"]
 
 
 CHUNK = 512  # poses worked on at once: long enough to hide the calls, and in 13 MB
-BLOCK = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
+BLOCK_POSES = 12288  # poses whose answers are kept unmerged: enough to fill the chunks of later passes
 GUESSES = 8  # postures close to answers that are kept of a pose
 
 
@@ -102,8 +102,8 @@ def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
         shaken: (N,), targets of which no pass that left them where they are did: a singular posture may be missing.
         guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
-    blocks = range(0, max(len(T), 1), BLOCK)
-    return stack_rows([_solve_block(elimination, T[begin : begin + BLOCK], moved) for begin in blocks])
+    blocks = range(0, max(len(T), 1), BLOCK_POSES)
+    return stack_rows([_solve_block(elimination, T[begin : begin + BLOCK_POSES], moved) for begin in blocks])
 
 
 def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _STEPS, _STAYS = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
-_BLOCK = 16_384  # samples solved at once at most
+_BLOCK_SAMPLES = 16_384  # samples solved at once at most
 _STRIDE = 8  # stride of the few samples that are solved first
 
 
@@ -121,7 +121,7 @@ class Samples:
 
     def solve_at(self, s: Array, examine: bool = True) -> Columns:
         """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
-        parts = [self._solve_block(s[k : k + _BLOCK], examine) for k in range(0, len(s), _BLOCK)]
+        parts = [self._solve_block(s[k : k + _BLOCK_SAMPLES], examine) for k in range(0, len(s), _BLOCK_SAMPLES)]
         return parts[0] if len(parts) == 1 else _concatenate(parts)
 
     def _solve_block(self, s: Array, examine: bool) -> Columns:

@@ -27,7 +27,7 @@ _TORN_PARTS = 3  # parts of a step in which branches end: where they are more, b
 _PARTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
 _AT_ONCE = 1024  # samples solved at once, if the parts are no fewer
 _MAX_SAMPLES = 50_000  # samples added at most
-_BLOCK = 16_384  # steps looked at together
+_BLOCK_STEPS = 16_384  # steps looked at together
 
 
 def link_branches(
@@ -164,8 +164,8 @@ class _Linking:
     def _link(self) -> None:
         """Find partners in the open steps."""
         rows, valid = np.flatnonzero(self.open), self.columns.valid
-        for k in range(0, len(rows), _BLOCK):
-            self._link_rows(rows[k : k + _BLOCK], valid)
+        for k in range(0, len(rows), _BLOCK_STEPS):
+            self._link_rows(rows[k : k + _BLOCK_STEPS], valid)
         self.open[:] = False
 
     def _link_rows(self, rows: Int, valid: Bool) -> None:

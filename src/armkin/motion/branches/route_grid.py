@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 _TIMES = 16.0  # factor, at most, on the number of points where the tolerance needs more
 _ROUNDS = 8  # rounds in which intervals are divided
-_BLOCK = 8192  # points looked at together
+_BLOCK_POINTS = 8192  # points looked at together
 _COARSE_STEP = 0.05  # step [mm], at most, if the tolerance is not larger
 _TURN = 1.6  # turn [rad] below which a step may be coarser where slopes are exact
 _SECTION_POINTS = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
@@ -208,7 +208,7 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Kno
         same = np.flatnonzero((positions[1:] == positions[:-1] + 1) & alike[1:] & alike[:-1])
         deviations[positions[same]], open_[positions[same]] = distances[same], False
     open_intervals = np.flatnonzero(open_)
-    for part in (open_intervals[i : i + _BLOCK] for i in range(0, len(open_intervals), _BLOCK)):
+    for part in (open_intervals[i : i + _BLOCK_POINTS] for i in range(0, len(open_intervals), _BLOCK_POINTS)):
         deviations[part] = _deviations(arm, route, path, part, lever)
     return deviations
 
@@ -229,8 +229,8 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
     inside = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
     s, points = s[inside], points[inside]
     worst: Missed = None
-    for i in range(0, len(s), _BLOCK):
-        nearest, given_points = s[i : i + _BLOCK], points[i : i + _BLOCK]
+    for i in range(0, len(s), _BLOCK_POINTS):
+        nearest, given_points = s[i : i + _BLOCK_POINTS], points[i : i + _BLOCK_POINTS]
         distance = np.full(len(nearest), np.inf)  # the least of what is met: in a tight corner the search may leave it
         for _ in range(3):  # the nearest place is a little before or behind
             q, slope = path.evaluate(np.clip(nearest, path.s[0], path.s[-1]))

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.motion.tool_path.route import Route
 
 DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad] at first, and where that swings joints round beside a singularity
-_BLOCK = 8192  # points looked at together
+_BLOCK_POINTS = 8192  # points looked at together
 _SETTLED = 1e-8  # relative length of a Newton step after which the next one would be nothing
 _SHORT_STEP, _STEP_RATIO = 1e-5, 1e-3  # relative length of a step, and ratio to the one before, that end the method
 _SLOPE_DISTANCE = 1e-6  # distance [mm] along the route to the target that tells a slope
@@ -34,7 +34,7 @@ def correct_to_route(
     damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
     round for what is within the tolerance anyway.
     """
-    blocks = [slice(i, i + _BLOCK) for i in range(0, len(q), _BLOCK)]
+    blocks = [slice(i, i + _BLOCK_POINTS) for i in range(0, len(q), _BLOCK_POINTS)]
     return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
 
 
@@ -118,7 +118,7 @@ def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, co
         d[positions], unsolved[positions] = coarser.d, False
     ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
     number = np.flatnonzero(unsolved)
-    for part in (number[i : i + _BLOCK] for i in range(0, len(number), _BLOCK)):
+    for part in (number[i : i + _BLOCK_POINTS] for i in range(0, len(number), _BLOCK_POINTS)):
         slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_SLOPE_DISTANCE, _SLOPE_DISTANCE))
         if slopes is None:
             return None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-_BLOCK = 16_384  # times or grid points looked at together
+_BLOCK_TIMES = 16_384  # times or grid points looked at together
 
 
 @dataclass(frozen=True)
@@ -153,8 +153,8 @@ class PathPlan:
             q: (N, n) [rad | mm] joint values along the way.
             s: (N,) [mm] the lengths at which they are.
         """
-        for i in range(0, len(q), _BLOCK):
-            candidates = _worst_conditioned(self.arm, q[i : i + _BLOCK])
+        for i in range(0, len(q), _BLOCK_TIMES):
+            candidates = _worst_conditioned(self.arm, q[i : i + _BLOCK_TIMES])
             worst = condition(self.arm, q[i + candidates])
             k = int(np.argmax(worst))
             if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
@@ -289,8 +289,8 @@ class PathPlan:
                 t = np.concatenate([stretch.times, stretch.times[1:] * (1 - 1e-12)])
             else:
                 t = np.linspace(0.0, stretch.duration, 200)
-            for k in range(0, len(t) - 1, _BLOCK):  # neighbouring blocks share a time: a jerk is between two
-                part = t[k : k + _BLOCK + 1]
+            for k in range(0, len(t) - 1, _BLOCK_TIMES):  # neighbouring blocks share a time: a jerk is between two
+                part = t[k : k + _BLOCK_TIMES + 1]
                 a = stretch.evaluate(part, 2)
                 speed = np.maximum(speed, np.abs(stretch.evaluate(part, 1)).max(axis=0))
                 accel = np.maximum(accel, np.abs(a).max(axis=0))

@@ -31,7 +31,7 @@ _QUEUED = 25  # segments that are surely in the board's queue
 _SETTLING = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
 _JUMP = 1.1  # factor on the motors' accelerations that a segment has at most
 _SAMPLES = 20_000  # samples looked at at once
-_BLOCK = 512  # segments made at once
+_BLOCK_SEGMENTS = 512  # segments made at once
 
 
 @dataclass(frozen=True)
@@ -51,10 +51,10 @@ class CurveSegments:
         bounds = self.bounds()
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
         before, span = np.zeros(len(self.start)), 0.0  # the speed at the end of the segment before, and its time
-        for first in range(0, len(bounds) - 1, _BLOCK):
-            t = bounds[first : first + _BLOCK + 1]
+        for first in range(0, len(bounds) - 1, _BLOCK_SEGMENTS):
+            t = bounds[first : first + _BLOCK_SEGMENTS + 1]
             counts = self._places_at(t)
-            if first + _BLOCK >= len(bounds) - 1:
+            if first + _BLOCK_SEGMENTS >= len(bounds) - 1:
                 counts[-1] = self.end
             steps = np.diff(counts, axis=0)
             # No motor faster than its greatest rate, whatever rounding says.
@@ -62,7 +62,7 @@ class CurveSegments:
             change = self._speed_changes(t, steps).tolist()
             mean = np.vstack([steps / seconds[:, None], np.zeros(len(self.start))])
             longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
-            open_end = first + _BLOCK < len(bounds) - 1  # what follows this block is not known here
+            open_end = first + _BLOCK_SEGMENTS < len(bounds) - 1  # what follows this block is not known here
             for k in range(len(t) - 1):
                 segment, before = self._smooth_segment(
                     cutter, float(seconds[k]), counts[k + 1].tolist(),

@@ -38,7 +38,7 @@ _BEFORE_STEP = 0.96  # share of the time to a motor's first step: until then no 
 _NO_STEP = 0.49  # part of a step that is left for the rounding of rates
 # Of its time, that such a first segment takes, at once at the speed that 1.2 of the acceleration makes in it; the
 # board's bound is 5/4. All edges come so much sooner, as far from one another as in the time law.
-UNHEARD = math.sqrt(1 / 2.4)
+UNHEARD = math.sqrt(1 / 2.4)  # share of its time
 _CRUISE = (0.2, 0.4)  # length [s] of a cruise segment, least and greatest
 _JERK = 0.02  # length [s] of a segment in which the acceleration changes
 _SPLIT = 0.08  # length [s] of a cruise segment whose end is one of its own
