@@ -191,7 +191,7 @@ def _able_to_jog(board: Board, person: Operator) -> None:
         )
         board.machine.prepare(assume=board.arm.home)
     except NoSolutionError:
-        return  # at its limit: the other way is open
+        return  # the joint stands at its limit: the other way is open
 
 
 def _until_enter(person: Operator, text: str) -> None:

@@ -54,7 +54,7 @@ def main() -> NoReturn:
         # object by object, a fifth of the time of a short command.
         os._exit(_run_command_line())
     except KeyboardInterrupt:
-        os._exit(130)  # before `run` could take care of it, or after
+        os._exit(130)  # Ctrl-C came before `run` could take care of it, or after
 
 
 def _run_command_line() -> int:

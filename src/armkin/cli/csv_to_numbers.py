@@ -361,6 +361,6 @@ def _split_cells(text: str) -> list[str]:
 
 def _column_places(heading: Sequence[str], name: str) -> list[int]:
     """See `armkin.columns.input_columns.column_places`."""
-    from armkin.columns.input_columns import column_places  # here, as it needs numpy
+    from armkin.columns.input_columns import column_places  # imported here, as it needs numpy
 
     return column_places(heading, name)

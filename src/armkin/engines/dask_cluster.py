@@ -57,7 +57,7 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
         except Exception as error:
             raise _lost_error(client, address, error) from None
         yield answer
-        # one out, one in: the window stays full
+        # a chunk comes in for each that went out: the window stays full
         with suppress(StopIteration):
             waiting.append(client.submit(_run_chunk, data, name, next(source), pure=False))
 

@@ -178,7 +178,7 @@ def _is_forward(theta: float) -> bool:
 
 def _degrees(angle: float) -> float:
     value = tidy(math.degrees(angle), 12)
-    return tidy(180.0 - (180.0 - value) % 360.0, 12)  # in (-180, 180]
+    return tidy(180.0 - (180.0 - value) % 360.0, 12)  # angle in (-180, 180]
 
 
 def _file_keys(

@@ -27,7 +27,7 @@ class StraightLineCode:
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
-        from armkin.formula.recording import record  # here, as one pose from the command line records nothing
+        from armkin.formula.recording import record  # imported here, as one pose from the command line records nothing
 
         self._recording = record(formula, inputs)
         self._batch: tuple[numpy_code.Run, list[numpy_code.Buffer]] | None = None

@@ -299,7 +299,7 @@ class _SweptTarget:
     """What the swept values of one target have come to so far."""
 
     best: tuple[int, Answer] | None = None  # the best status, and the first answer with it
-    names: dict[str, None] = field(default_factory=dict)  # in the order of coming
+    names: dict[str, None] = field(default_factory=dict)  # names in the order of coming
     last: tuple[str, ...] = ()  # names in the answer before
     free: set[str] = field(default_factory=set)
     total: int = 0

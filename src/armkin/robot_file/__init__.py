@@ -79,7 +79,7 @@ def parse_robot_file(raw: bytes | str, name: str = "robot.yaml") -> RobotFile:
     try:
         robot = _validate(document.data)
     except ValidationError as error:
-        from armkin.robot_file import robot_key_errors  # for invalid files only
+        from armkin.robot_file import robot_key_errors  # imported for invalid files only
 
         problems = [
             (document.line(path), f"{_place_text(path, document.data)}{text}")

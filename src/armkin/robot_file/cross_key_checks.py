@@ -45,7 +45,7 @@ def problems(robot: RobotKeys) -> Iterator[Problem]:
     yield from _check_motors(robot)
     yield from _check_axes(robot)
     if robot.keep_out:
-        from armkin.robot_file import keep_out_keys  # for files that have some alone
+        from armkin.robot_file import keep_out_keys  # imported for files that have some alone
 
         yield from keep_out_keys.keep_out_problems(robot.keep_out, ["base", *(joint.name for joint in robot.joints)])
 

@@ -295,7 +295,7 @@ def _read_key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> s
 
 def _read_scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
     text = str(event.value)
-    if not event.implicit[0]:  # in quotes, or a block of text
+    if not event.implicit[0]:  # the value is in quotes, or a block of text
         _check_text(text, line)
         return text
     if text in ("", "~", "null", "Null", "NULL"):

@@ -40,14 +40,14 @@ class Actions:
         self.program_actions = ProgramActions(
             arm, self.standing_pulses, lambda state: self.tabs.publish("program", state)
         )
-        # by name; whoever holds the key may stop the arm
+        # actions by name; whoever holds the key may stop the arm
         self.for_everyone: dict[str, Callable[[], dict[str, Any]]] = {
             "open": self._open,
             "solver": self._solver,
             "reach": self._reach,
             "stop": self._stop,
         }
-        self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # by name
+        self.for_control: dict[str, Action] = {"look": self._look, **self.program_actions.actions()}  # actions by name
         if port is not None:
             from armkin.teach.board_actions import BoardActions
             from armkin.teach.board_thread import BoardThread

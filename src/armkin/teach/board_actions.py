@@ -41,7 +41,7 @@ class BoardActions:
     def __init__(self, thread: BoardThread, program: Callable[[Array, float], PathPlan]) -> None:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
         self.thread, self.arm, self.program = thread, thread.arm, program
-        self._alive = 0.0  # until when a jog goes on
+        self._alive = 0.0  # time until which a jog goes on
         self._goal: Array | None = None
         self._lock = threading.Lock()
 

@@ -219,7 +219,7 @@ class Board(ABC):
             goal = jog_goal(arm, standing, joint, rate * piece, refuse=left == seconds)
             way = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not way.duration:
-                return  # at its limit, or before a keep-out
+                return  # the joint stands at its limit, or before a keep-out
             self.machine.run([self.lay(Trajectory(arm, way.start, (way,)), np.array(counts))])
             left -= piece
 

@@ -56,7 +56,7 @@ class Motor:
 class ServoCalibration:
     """What a calibration file says of an arm."""
 
-    motors: tuple[Motor, ...]  # in the arm's order
+    motors: tuple[Motor, ...]  # motors in the arm's order
     zero: tuple[float, ...]  # [counts] of every drive
     limits: tuple[tuple[float, float], ...]  # [deg] of every joint
     gripper: Motor | None

@@ -83,7 +83,7 @@ class Splitter:
                 return
             servo, length = self._bytes[2], self._bytes[3]
             if servo == 0xFF or not 2 <= length <= MAX_BYTES - 4:
-                del self._bytes[:1]  # not the beginning of a packet
+                del self._bytes[:1]  # this byte does not begin a packet
                 continue
             if len(self._bytes) < length + 4:
                 return

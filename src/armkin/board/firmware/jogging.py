@@ -99,7 +99,7 @@ def jog_motors(
         while (left := seconds - (port.now() - begin)) > 0 and goes_on():
             session.call(lambda tag: protocol.jog(tag, vector))
             if session.state != State.JOGGING:
-                break  # at a limit
+                break  # the joint stands at a limit
             pause = port.now() + min(0.08, left)
             while port.now() < pause and goes_on():
                 session.pump(max(0.001, min(0.01, pause - port.now())))

@@ -49,7 +49,7 @@ class GrblMachine(StepperArm):
         self.session.open()
         self._place = Place(self.session, arm, self.axes)
         self._record = self._place.record
-        self.settings, self.settings_time = self.session.settings(), port.now()  # when they were read
+        self.settings, self.settings_time = self.session.settings(), port.now()  # the time is that of their reading
         self._spindle = Spindle(self.session)
         self._read()
 
@@ -91,7 +91,7 @@ class GrblMachine(StepperArm):
         self.settings = self.session.settings()
         if before:
             self._place.forget("its settings were written")
-            with suppress(LinkError):  # in an alarm, or gone: forgotten all the same
+            with suppress(LinkError):  # GRBL may be in an alarm, or gone: forgotten all the same
                 self._reset()
         left = self.wrong()
         if left:

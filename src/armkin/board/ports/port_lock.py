@@ -50,7 +50,7 @@ class Lock:
         if not _signals:
             self._request = _lock_path(name, "stop")
             with suppress(OSError):
-                os.unlink(self._request)  # it was meant for who had the port before
+                os.unlink(self._request)  # the request was meant for who had the port before
             threading.Thread(target=self._forward_stop, daemon=True).start()
 
     def _forward_stop(self) -> None:

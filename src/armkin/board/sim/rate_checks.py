@@ -53,7 +53,7 @@ class Velocity:
         self.board, self.image = board, image
         self._bits = 23 if board.min_interval > 128 else 22  # velocities are in 2^-15 of 2^-bits steps a cycle
         self._last_pace, self._pace = Pace(), Pace()
-        self._last_ends = [(0, 0, 0)] * len(image.axes)  # at both ends of the last segment, and its rate
+        self._last_ends = [(0, 0, 0)] * len(image.axes)  # values at both ends of the last segment, and its rate
         self._excess = [(0, 0)] * len(image.axes)  # up, down; a quarter of a velocity
 
     def copy(self) -> Velocity:

@@ -33,7 +33,7 @@ class Motors:
         self.state = State.IDLE
         self._cruising: Iterator[None] | None = None  # homing or jogging, a step a millisecond
         self._hold = 0.0  # [s] time to a stop that the hold allows
-        self._brake = 1.0  # by which that falls in a second
+        self._brake = 1.0  # seconds by which the time to a stop falls in a second
         self._fault = fault
 
     def append(self, segments: list[Segment], at_rest: bool, brake: float) -> None:

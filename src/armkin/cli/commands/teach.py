@@ -66,7 +66,7 @@ def redirection(address: str) -> Iterator[str]:
     import tempfile
     from pathlib import Path
 
-    with tempfile.TemporaryDirectory(prefix="armkin-") as folder:  # for its owner alone
+    with tempfile.TemporaryDirectory(prefix="armkin-") as folder:  # the folder is for its owner alone
         file = Path(folder) / "teach.html"
         file.touch(mode=0o600)
         file.write_text(f'<!doctype html><meta http-equiv="refresh" content="0; url={address}">\n', encoding="ascii")

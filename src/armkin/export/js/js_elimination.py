@@ -57,7 +57,7 @@ def elimination_code(arm: Arm, task: Task, elimination: Elimination) -> str:
         "function candidates(goal, near, q, miss, passes) {"
     )
     pose = "goal"
-    if task.orientation == "axis":  # by way of a pose with that z axis and a joint more
+    if task.orientation == "axis":  # solved by way of a pose with that z axis and a joint more
         made = recording.record(tool_axis.pose_of, 6)
         code = c_and_js_code.write_code(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
         head = "\n".join([head, *(f"  {line}" for line in code.lines)])

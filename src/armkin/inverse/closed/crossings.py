@@ -46,7 +46,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         meets |= changes
-        second[changes] *= tol.SIGN_FACTOR  # there, not at a step beside it
+        second[changes] *= tol.SIGN_FACTOR  # the crossing lies there, not at a step beside it
     for b in range(1, B):  # double roots are there twice
         twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
         meets[:, :, b] &= ~twin.any(axis=2)

@@ -82,7 +82,7 @@ class SphericalWrist:
         L3 = chain.link[3]
         self.height4 = float((L3[:3, :3].T @ (after3 - L3[:3, 3]))[2])  # the centre on axis 4
         end = inverse(chain.link[6])
-        self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # in the tool's frame
+        self.centre = [float(v) for v in end[:3, :3] @ after6 + end[:3, 3]]  # centre in the tool's frame
         self.end = pose.constant(end)
         self.wrist = Wrist(chain.link[4], chain.link[5])
 

@@ -109,7 +109,7 @@ def _all_pieces(follower: Follower, shown: Summary) -> Pieces:
     of &= present.branch[:, None] == np.append(hidden.branch, short.branch)
     of &= (np.append(hidden.k, short.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
     families = _of_runs(t, present, False, shown.gone.at, places.there)
-    parts.append(rows_of(families, ~(present.within | of.any(axis=1))))  # without those that hold one of these
+    parts.append(rows_of(families, ~(present.within | of.any(axis=1))))  # families that hold one of these are left out
     parts[0] = _without_gaps(follower, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
     if len(row):

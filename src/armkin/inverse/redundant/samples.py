@@ -54,7 +54,7 @@ class Gone(NamedTuple):
     at: Changes
     twin: Int  # the branch that is nearest at the last sample
     apart: Array  # (G, 2) its squared distance there, and a sample before
-    room: Array  # to the limits there
+    room: Array  # room to the limits there
     legal: Bool
 
 

@@ -46,7 +46,7 @@ class Traced(NamedTuple):
 
     follower: Follower
     points: Points  # points of all curves, one after the other
-    ways: Ways  # from each point to the one after it
+    ways: Ways  # ways from each point to the next one
     row: Int  # (P,) whose target
     begin: Int  # (C,) first point of each curve
     counts: Int  # (C,) of its points
@@ -142,7 +142,7 @@ class Traced(NamedTuple):
         guess[index, joint] += np.sign(away[index, joint]) * room[index, joint]
         points = onto_curves(self.follower, self.row[point], guess, held)
         good = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
-        touching = np.flatnonzero(~good)  # it touches its limit alone
+        touching = np.flatnonzero(~good)  # the joint touches its limit alone
         points.q[touching] = self._between(point[touching], share[touching]).q
         return share, points.q
 

@@ -23,7 +23,7 @@ def share_rows(part: Callable[[slice], Result], count: int, workers: int, least:
     rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
     if workers == 1 or len(rows) < 2:
         return [part(slice(0, count))]
-    from concurrent.futures import ThreadPoolExecutor  # here, as few batches are shared
+    from concurrent.futures import ThreadPoolExecutor  # imported here, as few batches are shared
 
     with ThreadPoolExecutor(workers) as pool:
         return list(pool.map(part, rows))

@@ -21,7 +21,7 @@ def levers(arm: Arm) -> Array:
     size = np.linalg.norm(arm.link[1:, :3, 3], axis=1)
     far = np.maximum(np.abs(arm.lower), np.abs(arm.upper))
     size = size + np.where(arm.prismatic, np.where(np.isfinite(far), far, arm.reach), 0.0)
-    beyond = np.cumsum(size[::-1])[::-1]  # from each joint's axis to the tip, at most
+    beyond = np.cumsum(size[::-1])[::-1]  # distance from each joint's axis to the tip, at most
     bounds = np.zeros((n, n))
     for j in range(n):
         for k in range(n):

@@ -93,7 +93,7 @@ class _Linking:
         part.samples = samples
         part.columns = c.take_rows(rows)
         part.columns.partner = c.partner[rows[:-1]]
-        part.columns.partner[2::3] = -1  # between the groups
+        part.columns.partner[2::3] = -1  # the samples between the groups have no partner
         part.open = np.zeros(len(rows) - 1, bool)
         part.torn, part.both, part.crossing = part.open.copy(), part.open.copy(), part.open.copy()
         part.torn[1::3], part.both[1::3] = self.torn[steps], self.both[steps]
@@ -235,7 +235,7 @@ class _Linking:
                 crossed |= np.floor((value[starts] - limit) / self.turn[j]) != np.floor(
                     (value[ends] - limit) / self.turn[j]
                 )
-        k, b = np.nonzero(wrapped)  # these go the other way round
+        k, b = np.nonzero(wrapped)  # joints that go the other way round
         if len(k):
             start, end = q[starts][k, b], q[ends][k, b]
             unwrapped_end = start + joint_change(self.arm, start, end)

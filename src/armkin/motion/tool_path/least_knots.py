@@ -179,7 +179,7 @@ def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) ->
     like = np.bincount(interval, (miss_a * miss_b).sum(axis=0), M)
     size = np.bincount(interval, (miss_a**2).sum(axis=0), M)
     counts = np.bincount(interval, minlength=M)
-    weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # these miss the others for a few
+    weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # intervals that miss the others for a few
     return np.asarray(
         ~weighed & (counts >= _MIN_COUNT) & (like > 0.5 * size) & (size > counts * (_NOISE * rows.tolerance[0]) ** 2)
     )

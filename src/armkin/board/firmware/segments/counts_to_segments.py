@@ -240,7 +240,7 @@ def _fit_parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple
     slow = min(slow, mean + _MONOTONE * (mean - fast))
     a, b = (slow, fast) if change > 0 else (fast, slow)
     curve = 3 * (a + b) - 6 * mean
-    span = (b - a) * (ticks - 1) / ticks  # from the first interval's middle to the last one's
+    span = (b - a) * (ticks - 1) / ticks  # span from the first interval's middle to the last one's
     unit, block = (17, 1) if quick else (22, BLOCK)
     exact_bend = 2 * curve / ticks**2 * block * 2**unit
     bend = max(-_BEND, min(_BEND, round(exact_bend)))

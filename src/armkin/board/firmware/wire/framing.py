@@ -64,7 +64,7 @@ class Splitter:
         self.bad = 0
         self._largest = largest + 1
         self._incomplete = bytearray()
-        self._skip = False  # in a frame that is too long already
+        self._skip = False  # the frame is too long already
 
     def feed(self, received: bytes) -> Iterator[bytes]:
         """The payloads that `data` completes."""

@@ -38,13 +38,13 @@ class Window:
 
     def __init__(self, line: Line) -> None:
         self._line = line
-        self._waiting: deque[_Frame] = deque()  # not sent yet
-        self._sent: deque[tuple[_Frame, bytes]] = deque()  # not acknowledged yet
+        self._waiting: deque[_Frame] = deque()  # frames that are not sent yet
+        self._sent: deque[tuple[_Frame, bytes]] = deque()  # frames that are not acknowledged yet
         self._next = 0  # sequence number of the first of them
         self._free = 0
         self._receive = 0
         self._gap = False  # the first of those that were sent is lost for certain
-        self._sent_at = 0.0  # when any was written last
+        self._sent_at = 0.0  # time at which any was written last
         self._deaf = 0.0  # until then an answer may be to what was sent before the last going back
         self._bytes = _BYTES[1]  # bytes that may be under way
 
