@@ -5,9 +5,12 @@ import numpy as np
 import armkin
 
 arm = armkin.load("three_dof")
-s = armkin.ik(arm, [390, 80, 300])  # s.q: one row a branch [rad], in the order of s.branch; nan where one is not real
-for b in s.order:  # the best first: within limits, then the least motion from home
-    if s.valid[b]:
-        legal = "within limits" if s.within_limits[b] else "outside limits"
-        print(f"{s.names[s.branch[b]]:18} {np.rad2deg(s.q[b]).round(4)}  {legal}")
-print("complete:", bool(s.complete), " best:", s.names[s.branch[s.best]])  # complete: none is missing
+solutions = armkin.ik(arm, [390, 80, 300])
+# solutions.q has one row a branch [rad], nan where the branch is not real; solutions.branch numbers its name.
+names = [solutions.names[number] for number in solutions.branch]
+for row in solutions.order:  # the best first: within limits, then the least motion from home
+    if solutions.valid[row]:
+        degrees = np.rad2deg(solutions.q[row]).round(4)
+        legal = "within limits" if solutions.within_limits[row] else "outside limits"
+        print(f"{names[row]:18} {degrees}  {legal}")
+print("complete:", bool(solutions.complete), " best:", names[solutions.best])  # complete: no branch is missing
