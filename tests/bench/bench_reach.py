@@ -105,7 +105,8 @@ def compiled_agrees() -> bool:
 
 def cells_agree(seed: int = 1, poses: int = 10**6) -> bool:
     """Cells of random grids by arcs, against `ik` of each of their poses."""
-    from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
+    from armkin.model.units import TURN
+    from armkin.reachability.cell_answers import CellQuestion, cell_columns
     from armkin.reachability.reach_cells import Grid
 
     rng, total, different = np.random.default_rng(seed), 0, 0

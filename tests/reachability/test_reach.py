@@ -11,9 +11,10 @@ import pytest
 
 import armkin
 from armkin.errors import UsageError
+from armkin.model.units import TURN
 from armkin.reachability import reach_map as maps
 from armkin.reachability import voxels
-from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
+from armkin.reachability.cell_answers import CellQuestion, cell_columns
 from armkin.reachability.reach_cells import Grid
 from command_line import ROOT, Result, run
 from ctrl_c import interrupt_at

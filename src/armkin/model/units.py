@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 DEGREE = math.pi / 180  # degree [rad]
+TURN = 2 * math.pi  # whole turn [rad]
 
 JointUnits = Annotated[list[str], "unit of each joint value: deg or mm"]
 

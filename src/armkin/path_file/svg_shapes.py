@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 Point = tuple[float, float]
 Matrix = tuple[float, float, float, float, float, float]  # x' = a x + c y + e, y' = b x + d y + f
 CHORD_DISTANCE = 0.002  # distance [mm] of a chord from its curve
-_TURN = math.radians(8.0)  # turn [rad] of a curve from chord to chord, at most
+_CHORD_ANGLE = math.radians(8.0)  # turn [rad] of a curve from chord to chord, at most
 _MAX_CHORDS = 20_000  # chords of one curve, at most
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GAP = re.compile(r"[ \t\r\n]*,?[ \t\r\n]*")
@@ -209,7 +209,7 @@ class _Outline:
     def ellipse(self, c: Point, rx: float, ry: float, turned: float, begin: float, angle: float) -> None:
         """An arc of an ellipse about c, its axes turned [rad], from `begin` over `angle`."""
         size = max(rx, ry) * self.scale
-        step = min(_TURN, 2 * math.acos(1 - min(CHORD_DISTANCE / size, 1.0))) if size > 0 else _TURN
+        step = min(_CHORD_ANGLE, 2 * math.acos(1 - min(CHORD_DISTANCE / size, 1.0))) if size > 0 else _CHORD_ANGLE
         n = _chord_count(abs(angle) / step, 1)
         cos, sin = math.cos(turned), math.sin(turned)
         for k in range(1, n + 1):

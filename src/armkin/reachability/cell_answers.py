@@ -24,6 +24,7 @@ from armkin.forward import jacobian
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.solve import ik
 from armkin.model.limits import SLACK
+from armkin.model.units import TURN
 from armkin.motors import joints_per_pulse
 from armkin.reachability.dexterity import measure_function
 from armkin.reachability.reach_cells import STRAIGHT, Grid
@@ -31,7 +32,6 @@ from armkin.reachability.reach_cells import STRAIGHT, Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-TURN = 2 * math.pi  # whole turn [rad]
 MEASURES = ("manipulability", "limit_margin", "step_error_mm")
 Words = NDArray[np.uint64]
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool
 from armkin.model.limits import SLACK
-from armkin.reachability.cell_answers import TURN
+from armkin.model.units import TURN
 
 if TYPE_CHECKING:
     from armkin.inverse.answers.solutions import Solutions

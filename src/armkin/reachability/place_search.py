@@ -34,8 +34,9 @@ from armkin.inverse.solve import ik
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import read_targets
 from armkin.model.lock_joints import unlock
+from armkin.model.units import TURN
 from armkin.reachability import kept_chunks, place_path
-from armkin.reachability.cell_answers import TURN, limit_margin
+from armkin.reachability.cell_answers import limit_margin
 from armkin.reachability.place_arm import split_keep_outs
 from armkin.reachability.place_path import PathFromPlace
 from armkin.reachability.place_targets import (

@@ -16,8 +16,9 @@ from armkin.inverse.solve import columns, ik, isolated_branches
 from armkin.inverse.tasks.task import Task
 from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
+from armkin.model.units import TURN
 from armkin.reachability import place_branches
-from armkin.reachability.cell_answers import TURN, legal_arc, pack_bits, some_copy_legal
+from armkin.reachability.cell_answers import legal_arc, pack_bits, some_copy_legal
 from armkin.reachability.place_arm import Obstacles, free_at_place
 from armkin.reachability.place_upright import RADII, by_radius
 from armkin.reachability.reach_cells import STRAIGHT

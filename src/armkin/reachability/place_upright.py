@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import columns
 from armkin.model.limits import SLACK
-from armkin.reachability.cell_answers import TURN, whole_turn
+from armkin.model.units import TURN
+from armkin.reachability.cell_answers import whole_turn
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm

@@ -23,8 +23,9 @@ from armkin.files import check_writable, file_ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import actual_arm
+from armkin.model.units import TURN
 from armkin.reachability import kept_chunks
-from armkin.reachability.cell_answers import TURN, CellQuestion, cell_columns
+from armkin.reachability.cell_answers import CellQuestion, cell_columns
 from armkin.reachability.reach_cells import Grid
 
 if TYPE_CHECKING:

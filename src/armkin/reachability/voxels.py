@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.model.units import TURN
+
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.reachability.reach_cells import Grid
-
-TURN = 2 * np.pi  # whole turn [rad]
 
 
 class Layer(NamedTuple):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, limit_fields, outside_text
+from armkin.model.units import TURN
 from armkin.motion.plan.trajectory_proof import check_free, free_way
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import joints, legal_with_same_pulses, pulses, resolution
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-_TURN = 2 * np.pi  # way [rad] outside its limits at which a revolute joint's position is not believed
 _SAMPLES = 256  # samples of a curve that begins outside the limits
 
 
@@ -115,7 +115,7 @@ def why_impossible(arm: Arm, counts: Sequence[int]) -> str | None:
         q = joints(arm, counts)
     except UsageError as error:  # motors of one joint contradict each other
         return error.message
-    most = np.where(arm.prismatic, arm.upper - arm.lower, _TURN)
+    most = np.where(arm.prismatic, arm.upper - arm.lower, TURN)
     for k in np.flatnonzero(np.abs(q - np.clip(q, arm.lower, arm.upper)) > most + SLACK):
         far = "its travel" if arm.prismatic[k] else "a whole turn"
         return f"{outside_text(arm, int(k), float(q[k]))} by more than {far}"

@@ -15,8 +15,8 @@ from armkin.forward import one_pose
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
+from armkin.model.units import TURN
 
-TURN = 2 * np.pi  # whole turn [rad]
 HALF_TURN = np.pi + SLACK  # distance [rad] above `near`, at most, of a copy
 MAX_COPIES = 50_000  # copies of one branch that `turns` gives
 

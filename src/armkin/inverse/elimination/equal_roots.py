@@ -15,7 +15,7 @@ from armkin.inverse.numeric import tolerances as tol
 
 # (cos 3f, sin 3f, cos f, sin f) to (c^3, c^2 s, c s^2, s^3) of c = cos f, s = sin f
 _CUBIC: Array = 0.25 * np.array([[1, 0, 3, 0], [0, 1, 0, 1], [-1, 0, 1, 0], [0, -1, 0, 3]], dtype=float)
-_TURN = 0.4137  # angle [rad] by which f is turned: no joint stands where tan f is infinite then
+_SHIFT_ANGLE = 0.4137  # angle [rad] by which f is turned: no joint stands where tan f is infinite then
 _SECOND = 0.6180  # weight of the second joint: solutions that have the first one alike are told apart by it
 
 
@@ -54,9 +54,9 @@ def products(v: Array) -> tuple[Array, Bool, Bool]:
 
 
 def _quotient(low: Array, high: Array) -> tuple[Array, Bool]:
-    """X' (G, d, d) of high = X low for the rows (G, d, ...) of mixtures, turned by `_TURN`; whether X is determined."""
+    """X' (G, d, d) of high = X low for mixtures' rows (G, d, ...), turned by `_SHIFT_ANGLE`; whether X is determined.."""
     shape = (*low.shape[:2], low.shape[2] * low.shape[3])
-    c, s = np.cos(_TURN), np.sin(_TURN)
+    c, s = np.cos(_SHIFT_ANGLE), np.sin(_SHIFT_ANGLE)
     below, above = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)
     square = below @ below.swapaxes(1, 2)
     size = np.linalg.eigvalsh(square)

@@ -23,8 +23,8 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import Pieces, best_samples, holding_none, none, runs
 from armkin.model.arm import Arm
 from armkin.model.rotation import inverse, rotation_about
+from armkin.model.units import TURN
 
-TURN = 2 * np.pi  # whole turn [rad]
 EVEN_SAMPLES = 24  # samples of a turn besides the roots
 STEPS = 8  # steps of the golden section: the kinks of the motion from near are samples, and a parabola ends it
 JOINTS = (0, 1, 2), (4, 5, 6)  # numbers of the joints of the shoulder and of the wrist

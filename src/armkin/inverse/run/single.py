@@ -19,7 +19,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import point_numbers
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.branches.whole_turns import TURN, nearest_number
+from armkin.inverse.branches.whole_turns import nearest_number
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.near_itself import COARSE_ROOM, ROOM
@@ -27,7 +27,7 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED, rotation_check
 from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
-from armkin.model.units import radian_or_reach
+from armkin.model.units import TURN, radian_or_reach
 
 
 @lru_cache(maxsize=64)

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
+from armkin.model.units import TURN
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-TURN = 2 * np.pi  # whole turn [rad]
 MIN_LEVER = 30.0  # lever [mm], at least, of a turn that does not move the tip: the tool's direction counts, too
 
 

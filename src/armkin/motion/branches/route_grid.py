@@ -23,7 +23,7 @@ _TIMES = 16.0  # factor, at most, on the number of points where the tolerance ne
 _ROUNDS = 8  # rounds in which intervals are divided
 _BLOCK_POINTS = 8192  # points looked at together
 _COARSE_STEP = 0.05  # step [mm], at most, if the tolerance is not larger
-_TURN = 1.6  # turn [rad] below which a step may be coarser where slopes are exact
+_MIN_CHORD_TURN = 1.6  # turn [rad] of a chord below which a step may be coarser where slopes are exact
 _SECTION_POINTS = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
 _MIN_POINTS = 2  # points of a section where slopes are exact: they need no neighbours
 _GROWTH = 2.5  # ratio of an interval to the next one, at most: motions speed up and slow down beside bends
@@ -130,7 +130,7 @@ def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, ex
     deviations, steps, h = (np.delete(values, path.rests) for values in (distance, _chord_bounds(arm, path), path.h))
     coarse = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # the error is of second order in h
     if exact:  # a chord that is so long but hardly turns is well: 8 steps / h, of first order
-        coarse = np.minimum(coarse, 8 * steps / (h * _TURN))
+        coarse = np.minimum(coarse, 8 * steps / (h * _MIN_CHORD_TURN))
     return np.maximum(np.cbrt(deviations / tolerance), coarse)  # the error is of third order in h
 
 

@@ -20,7 +20,7 @@ _POLL_NOISY = 0.025  # time [s] between two STATUS? on a bad line, which loses s
 _POLL_SOON = 0.01  # time [s] between two STATUS? while waiting for credit, which only answers bring, or for the end
 _ENDS = 50  # motion [ms] that the queue holds when its end is near
 _GIVE_UP = 1.5  # time [s] without any answer after which a board counts as gone
-_TURN = 0.1  # time [s] that one turn counts at most: a program that had to wait longer for its own turn was deaf
+_MAX_TURN_WAIT = 0.1  # time [s] that one turn counts at most: a program that waited longer for its own was deaf
 _QUIET = 3.0  # time [s] of questions without an answer, of a board that was there
 _UNANSWERED = 16  # questions without an answer
 _STALLED = 5.0  # time [s] beyond what all in the queue may take
@@ -183,7 +183,7 @@ class Session:
             if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
                 raise StoppedError(self.hold())
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
-        self._silent_for += min(self.port.now() - present, _TURN)
+        self._silent_for += min(self.port.now() - present, _MAX_TURN_WAIT)
         if self.heard >= present:
             self._silent_for = 0.0
         elif self._silent_for > _GIVE_UP:
