@@ -326,9 +326,8 @@ class _CompiledTask:
         if self.geometry.places is not None:
             self._place_branches(batch, target)
         if left:
-            rows = np.flatnonzero(
-                batch.state.view(np.bool_)
-            )  # all targets have been read: 0 or 1, which is quicker told
+            # All targets have been read, so each state is 0 or 1, and flags are read faster than numbers.
+            rows = np.flatnonzero(batch.state.view(np.bool_))
             self._solve_by_python(batch, rows, target, near_rows)
         return batch
 

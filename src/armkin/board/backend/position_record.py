@@ -121,9 +121,8 @@ def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
         return bool(np.abs(counts - points[0]).max(initial=0) <= _STEP)
     line, offset = np.diff(points, axis=0), counts - points[:-1]
     with np.errstate(divide="ignore"):
-        ends = np.stack(
-            [(offset - _STEP) / line, (offset + _STEP) / line]
-        )  # shares of the line at which a motor is near
+        # Shares of the line at which a motor is near.
+        ends = np.stack([(offset - _STEP) / line, (offset + _STEP) / line])
     first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
     return bool((first <= last).any())
 

@@ -69,9 +69,8 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     if not arm.keep_out or machine.position() == "lost":
         return math.inf
     q = machine.joints()
-    joint_rates = np.linalg.pinv(arm.motor_gain) @ [
-        rates[axis] for axis in machine.configuration.axes
-    ]  # [rad/s | mm/s]
+    axis_rates = [rates[axis] for axis in machine.configuration.axes]
+    joint_rates = np.linalg.pinv(arm.motor_gain) @ axis_rates  # [rad/s | mm/s]
     rate = float(joint_rates[joint])
     room = max(float((arm.lower, arm.upper)[rate > 0][joint] - q[joint]) / rate, 0.0)
     goal = q + min(room, _MAX_SECONDS) * joint_rates

@@ -54,9 +54,8 @@ class Report:
     position: tuple[float, ...] | None  # machine position
     free: tuple[int, int] | None  # planner blocks and receive bytes
     pins: str  # inputs that are active: limits X Y Z A B C, probe P, door D, hold H, reset R, start S
-    feed: int | None = field(
-        default=None, compare=False
-    )  # [%] that feeds are overridden by, which one report in some tells
+    # [%] that feeds are overridden by; only some reports hold it
+    feed: int | None = field(default=None, compare=False)
 
 
 def parse_report(line: str) -> Report | None:

@@ -36,10 +36,8 @@ def stop(
         raise UsageError("there is nothing to stop: a simulated board lives in the command that started it")
     process = holder_pid(port)
     if process is not None:
-        is_foreign = holder_rate(port) not in (
-            None,
-            baud,
-        )  # a board of others: it was stopped by the process that moved it
+        # The process that moved a board of others has stopped it.
+        is_foreign = holder_rate(port) not in (None, baud)
         _end_process(process, port)
         output.note(f"process {process} has given the port back")
         if is_foreign and not power_cut:

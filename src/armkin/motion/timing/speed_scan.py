@@ -97,9 +97,8 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     """
     y = (top if previous is None else previous).copy()
     y[0] = top[0]
-    first = np.append(
-        0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1))
-    )  # index of each interval's first function
+    # The index of each interval's first function.
+    first = np.append(0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1)))
     for _ in range(_MAX_ROUNDS):
         reached = least.values(y[:-1])
         k = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]

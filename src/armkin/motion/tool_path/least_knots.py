@@ -90,9 +90,8 @@ class Rows:
         along = np.where(self.point[:, None] >= 0, along, self.chord_direction)
         along[self.ends] = 0.0
         far = (miss * along).sum(axis=1)
-        past = np.maximum(far - self.chord_left, 0.0) + np.minimum(
-            far + self.chord_done, 0.0
-        )  # a chord's end, or its begin
+        # The distance past a chord's end, or before its begin.
+        past = np.maximum(far - self.chord_left, 0.0) + np.minimum(far + self.chord_done, 0.0)
         far -= np.where(self.point >= 0, 0.0, past)
         return np.asarray(miss - far[:, None] * along)
 

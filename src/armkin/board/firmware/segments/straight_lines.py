@@ -176,11 +176,8 @@ def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[floa
             continue
         if parts > 1:
             yield t0, t1 - part_time, parts - 1
-        yield (
-            t1 - part_time,
-            t1,
-            [t1 - part_time / 4, t1],
-        )  # a short end: what its rates' rounding leaves, the ramp makes up for
+        # A short end: the ramp makes up for what the rounding of its rates leaves.
+        yield t1 - part_time, t1, [t1 - part_time / 4, t1]
 
 
 def _segment_bounds(law: Profile, steps: int, pieces: Pieces) -> Iterator[float]:
