@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import enum
 import inspect
@@ -21,6 +22,8 @@ SECTION = re.compile(r"^(Args|Attributes|Returns|Raises):\n((?:(?:    .*)?\n?)*)
 ENTRY = re.compile(r"^    \*{0,2}(\w+): *(\S.*(?:\n {6,}.*)*)", re.M)  # a name, what it is, and lines indented more
 SHAPE = re.compile(r"^\((?:\.\.\.|\d+|[A-Za-z]\w*| [+-] |, ?)*\)")  # (), (..., n), (N, 3)
 UNIT = re.compile(r"\[[^]]+\]")
+# Words that lean on the text before: `help()` shows none.
+WITHOUT_NOUN = re.compile(r"(Those|These|They|Them|Its?|And|But|Or|Of|As|By|The same|One of them|So many|At many)\b")
 ARRAYS = ("ArrayLike", "Array", "NDArray", "Joints", "Points", "Poses", "Frames", "Jacobians", "Figures", "Pulses")
 
 
@@ -79,6 +82,17 @@ def _has_shape_and_unit(annotation: str, text: str) -> bool:
 def test_there_is_something_to_read() -> None:
     assert len(FUNCTIONS) > 40
     assert len(CLASSES) > 12
+
+
+def test_every_docstring_names_what_it_is_about() -> None:
+    leaning = [
+        f"{path.relative_to(ROOT)}:{node.lineno} {text}"
+        for path in (ROOT / "src").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+        and WITHOUT_NOUN.match(text := ast.get_docstring(node) or "")
+    ]
+    assert not leaning
 
 
 @pytest.mark.parametrize("name", PUBLIC)

@@ -58,7 +58,7 @@ class ArmkinError(Exception):
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", type(self).__name__.removesuffix("Error")).lower()
 
     def within(self, place: str, **fields: Any) -> Self:
-        """The same error, said of a place: ``row 3: ...``.
+        """This error, said of a place: ``row 3: ...``.
 
         Args:
             place: what the message begins with.
@@ -120,7 +120,7 @@ class NoSolutionError(ArmkinError):
     plan: Any = None
 
     def within(self, place: str, **fields: Any) -> Self:
-        """The same error with the same plan, said of a place.
+        """This error with its plan, said of a place.
 
         Args:
             place: what the message begins with.

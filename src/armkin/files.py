@@ -147,7 +147,7 @@ def _open(file: str | int, mode: str) -> IO[Any]:
 
 
 def _permissions(path: str) -> int:
-    """Those of the file that is replaced, or what the umask leaves of rw-rw-rw-."""
+    """Permissions of the file that is replaced, or what the umask leaves of rw-rw-rw-."""
     with suppress(OSError):
         return stat.S_IMODE(os.stat(path).st_mode)
     mask = os.umask(0)

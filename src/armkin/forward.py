@@ -312,13 +312,13 @@ def _recorded_of_turns(arm: Arm, formula: Formula) -> LazyCode:
 
 @lru_cache(maxsize=256)
 def _turn_places(arm: Arm) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Of `_slides_and_turns`: where slides and where cosines stand; and the ratios of what turns (m, 1)."""
+    """Rows of `_slides_and_turns` where slides and where cosines stand, and the ratios of what turns (m, 1)."""
     first = np.cumsum([0, *np.where(arm.prismatic, 1, 2)])[:-1]
     return first[arm.prismatic], first[~arm.prismatic], arm.ratio[~arm.prismatic, None]
 
 
 def _slides_and_turns(arm: Arm, q: Array) -> Array:
-    """Of joint values (N, n) slides, and actual cosines and sines of what turns, joint by joint: (2 n - slides, N)."""
+    """Slides, and actual cosines and sines of what turns, joint by joint: q (N, n) [rad | mm] -> (2 n - slides, N)."""
     slides, turning, ratio = _turn_places(arm)
     values = np.ascontiguousarray(q.T)
     rows = np.empty((len(slides) + 2 * len(turning), len(q)))
@@ -331,7 +331,7 @@ def _slides_and_turns(arm: Arm, q: Array) -> Array:
 
 
 def _joint_motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
-    """The same joint by joint."""
+    """What `_slides_and_turns` returns, one entry a joint: a slide, or a cosine and a sine."""
     remaining = iter(turns)
     return [next(remaining) if slides else (next(remaining), next(remaining)) for slides in arm.prismatic.tolist()]
 

@@ -228,7 +228,7 @@ def a_reset_in_a_motion_is_told(start: Start, times: int = 5) -> None:
 
 
 def another_program_makes_nothing_false(start: Start, times: int | None = None) -> None:
-    """It speaks before, between and in motions."""
+    """Another program on the line speaks before, between and in motions: no position is false."""
     ways = itertools.product((8, None, 1, 25), range(len(start().foreign)))
     for asks, number in itertools.islice(ways, times):
         with _start_emulator(start) as emulated:
@@ -246,7 +246,7 @@ def another_program_makes_nothing_false(start: Start, times: int | None = None) 
 
 
 def a_cable_that_is_pulled_makes_nothing_false(start: Start, times: int = 20) -> None:
-    """At many moments of a motion; the next program says where the arm stands, or that nobody knows."""
+    """A cable is pulled at many moments of a motion; the next program says where the arm stands, or that none knows."""
 
     with _start_emulator(start) as emulated:
 
@@ -260,7 +260,7 @@ def a_cable_that_is_pulled_makes_nothing_false(start: Start, times: int = 20) ->
 
 
 def a_stalled_axis_is_told(start: Start, times: int = 3) -> None:
-    """By kinds that can see one: the motion is not said to be done."""
+    """A motion in which an axis stalls is not said to be done, by kinds that can see a stall."""
     for k in range(times):
         with _start_emulator(start) as emulated:
             if emulated.stall is not None:
@@ -269,7 +269,7 @@ def a_stalled_axis_is_told(start: Start, times: int = 3) -> None:
 
 
 def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, times: int = 20) -> None:
-    """At many places of a motion."""
+    """A hold at many places of a motion keeps the position, and the next motion goes on from there."""
     with _start_emulator(start) as emulated:
         for k in range(times):
             _while_moving(emulated, 1 + 3 * k, None)
@@ -278,7 +278,7 @@ def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, times: i
 
 
 def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> None:
-    """It is a bug of who made it, and no motion."""
+    """A plan that begins at other counts raises StartError and moves nothing: it is a bug of who made it."""
     with _start_emulator(start) as emulated:
         machine = _connect_and_settle(emulated)
         before, first_plan = _pin_counts(emulated), machine.plan(machine.counts(), _distant_goal(emulated))

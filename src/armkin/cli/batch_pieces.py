@@ -58,7 +58,7 @@ class Rows:
 
     @property
     def size(self) -> int | None:
-        """Of the file [bytes]; None for what is no file."""
+        """Size of the file [bytes]; None for what is no file."""
         return os.path.getsize(self.source) if self.source is not None and os.path.isfile(self.source) else None
 
     def count(self) -> int | None:

@@ -226,7 +226,7 @@ def _among_others(rows: list[list[bytes]], width: int, places: list[int]) -> Arr
 
 
 def _by_arrow(text: bytes, width: int) -> Array | None:
-    """The same by pyarrow, where it is installed and takes every cell for a number."""
+    """Numbers (rows, width) of a text by pyarrow; None where it is missing or takes a cell for no number."""
     import numpy as np
 
     try:

@@ -51,7 +51,7 @@ def _family_text(branch: Branch) -> str:
 
 
 def _turned_text(angle_deg: float) -> str:
-    """By how much a rotation is off the target's, where it is more than rounding."""
+    """How far a rotation is off the target's [deg], in words; "" where it is no more than rounding."""
     return f"turned by {fixed_text(angle_deg)} deg" if angle_deg > 1e-6 else ""
 
 

@@ -32,7 +32,7 @@ def load_moving_arm(robot: str, scene: str | None, ignore: bool = False, tool: s
 
 
 def mark_ignored(arm: Arm, ignore: bool) -> Arm:
-    """The same arm, its motions not proved if keep-outs are ignored; radii that are assumed are named."""
+    """The arm, its motions not proved if keep-outs are ignored; radii that are assumed are named."""
     if not arm.keep_out:
         return arm
     from dataclasses import replace
@@ -65,7 +65,7 @@ def check_port(port: str, arm: Arm, no_scene: bool, *, simulated: bool = False) 
 
 
 def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
-    """As `check_port`, for a board that is open; also tells if the arm stands in a hit."""
+    """Check the scene of an open board's port, as `check_port` does, and tell if the arm stands in a hit."""
     check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
     if not arm.keep_out or machine.position() == "lost":
         return

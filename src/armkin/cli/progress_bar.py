@@ -21,7 +21,7 @@ class Bar:
         self._drawn.start()
 
     def update(self, count: int, total: int | None, seconds: float) -> None:
-        """So many are done, of so many, after so long."""
+        """Draw the bar for `count` done of `total` (None: unknown) after so many seconds."""
         self._drawn.update(
             self._task, completed=count, total=total, progress_text=progress_text(self.task, count, total, seconds)
         )

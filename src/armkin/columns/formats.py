@@ -41,7 +41,7 @@ ENDINGS = tuple(name for name in _BY_ENDING if name)
 
 
 def format_of(path: str | None) -> Format:
-    """By the ending of a file's name; no name, a name without an ending and a pipe are CSV.
+    """The format that a file name's ending says; no name, a name without an ending and a pipe are CSV.
 
     Raises UsageError for another ending.
 

@@ -28,7 +28,7 @@ class _Kept(NamedTuple):
         return self.dtype if self.words is None else np.array([*self.words, ""]).dtype
 
     def read(self, part: IO[bytes]) -> Column:
-        """Its values."""
+        """The column's values, (rows,), read from its part of the file."""
         part.seek(self.offset)
         values = np.frombuffer(part.read(self.rows * self.dtype.itemsize), self.dtype)
         return values if self.words is None else Words(values, self.words)

@@ -219,7 +219,7 @@ class _CompiledTask:
     def _solve_batch(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
     ) -> Solutions:
-        """As `ik`, of an arm whose joints move as they are commanded."""
+        """Solutions of `ik` for an arm whose joints move as they are commanded."""
         array = arrays.real_array(targets, "targets")
         m = len(self.goal_shape)
         if array.shape[-m:] != self.goal_shape or array.ndim < m:
@@ -274,7 +274,7 @@ class _CompiledTask:
             batch.branch[...] = follow_branches(self.arm, self.task, batch.q, target)
 
     def _solve_without_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
-        """As `armkin.ik`; of an arm with a redundant joint the others by machine code."""
+        """Solutions of `armkin.ik`; where a joint is redundant, machine code solves for the others."""
         if (spare := redundancy(self.arm, self.name)) is not None:
             return families(_solve_others, self.arm, spare, targets, near, stated)
         return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
@@ -354,7 +354,7 @@ class _CompiledTask:
             values[solved, :wide] = np.take_along_axis(found_values, order, axis=1)
 
     def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
-        """As `_solve_rows`, for an elimination: block by block, in no more columns than the batch needs."""
+        """Results of `_solve_rows` for an elimination, block by block, in no more columns than the batch needs."""
         batch = Results(len(target), 0, self.n)
         for start in range(0, max(len(target), 1), BLOCK_POSES):
             rows = slice(start, min(start + BLOCK_POSES, len(target)))

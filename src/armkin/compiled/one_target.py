@@ -69,7 +69,7 @@ class Single:
         return parts
 
     def _split_block(self, rows: int) -> tuple[Any, ...]:
-        """Of that many branches: where q, valid, within, branch and free stand, and the fields that do not differ.
+        """Where q, valid, within, branch and free of `rows` branches stand, and the fields that do not differ.
 
         q's shape follows its place.
         """

@@ -17,7 +17,7 @@ _MAX_SECONDS = 120.0  # time [s] that an upload may take; an Uno takes 7
 
 
 def find_avrdude() -> str | None:
-    """Its path."""
+    """The path of avrdude; None if it is not installed."""
     return shutil.which("avrdude")
 
 

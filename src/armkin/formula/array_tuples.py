@@ -28,7 +28,7 @@ def stack_rows(parts: Sequence[Columns]) -> Columns:
 
 
 def replace_rows(columns: Columns, index: NDArray[Any], rows: Columns) -> Columns:
-    """The same with other rows in place of some, as wide as both need; in place where that is as wide."""
+    """The columns with other rows at `index`, as wide as both need; columns that are wide enough change in place."""
     table: Any = columns
     pairs = zip(table, rows, strict=True)  # type: ignore[call-overload]
     changed: Columns = table._make(_replace_values(column, index, values) for column, values in pairs)

@@ -83,7 +83,7 @@ class _Buffers:
             self.buffers.append(Buffer(*kind))
 
     def release(self, nodes: list[Node]) -> None:
-        """Those of these values are free again."""
+        """Free the buffers of these values for later ones."""
         for x in nodes:
             self._free.setdefault(self._kinds[id(x)], []).append(self.names[id(x)])
 

@@ -207,7 +207,7 @@ def _is_zero(x: Any) -> bool:
 
 
 def _constant_key(x: Any) -> Any:
-    """Its digits: -0.0 is not 0.0."""
+    """A key of a constant's exact bits: -0.0 is not 0.0."""
     return x.hex() if isinstance(x, float) else (np.shape(x), np.asarray(x).tobytes())
 
 

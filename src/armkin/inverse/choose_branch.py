@@ -145,7 +145,7 @@ def locked_arm(request: Request) -> Arm:
 
 
 def prepared_arm(request: Request) -> Arm:
-    """As `locked_arm`, or one arm for all values that a redundant joint is held at: its targets are others."""
+    """The arm of `locked_arm`, or one for all values that a redundant joint is held at: its targets are others."""
     free = redundant_alone(request.arm, request.task, request.held)
     return locked_arm(request) if free is None else free.rest
 
@@ -233,8 +233,8 @@ def blocked_error(request: Request, answer: Answer) -> NoBranchError:
 
 
 def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
-    """Of branches, each with whether it is wanted, the first one within limits and free; where hits are ignored and
-    none is, with hits."""
+    """Index of the first branch within limits and free, of those that are wanted (their flags); where hits are ignored
+    and none is free, with hits."""
     free = (i for i, (branch, named) in enumerate(branches) if named and branch.may_be_taken)
     hit = (i for i, (branch, named) in enumerate(branches) if named and branch.within_limits and request.ignore)
     return next(free, next(hit, None))

@@ -182,7 +182,7 @@ def _as_commanded(arm: Arm, solved: Solutions) -> Solutions:
 def _by_slower_class(
     goals: Goals, geometry: Geometry | None, batch: Batch, left: Int, examine: bool, workers: int
 ) -> Batch:
-    """The same with what a closed form leaves in doubt solved the other way that it names."""
+    """The batch with what a closed form leaves in doubt solved the other way that it names."""
     assert geometry is not None
     part = arm, task, target, near = goals.of(left)
     if not geometry.pairs:

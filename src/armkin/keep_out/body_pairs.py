@@ -72,7 +72,7 @@ class Guard:
         return np.concatenate(parts) if parts else np.empty((0, len(q)))
 
     def clearances(self, q: Array) -> Array:
-        """The same with `clearance` taken off: negative is a hit."""
+        """Distance of every pair less the arm's `clearance`: q (N, n) -> (N, pairs) [mm]; negative is a hit."""
         return self.distances(q) - self.arm.clearance
 
     def least_clearances(self, q: Array) -> tuple[Array, NDArray[np.intp]]:

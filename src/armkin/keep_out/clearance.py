@@ -96,7 +96,7 @@ def hits_nothing(arm: Arm, q: Array) -> NDArray[np.bool_]:
 
 
 def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
-    """Of each posture (N, n) the least clearance [mm] (None: nothing counts) and its hits, the deepest first."""
+    """The least clearance [mm] of each posture (N, n) (None: nothing counts) and its hits, the deepest first."""
     full_arm, full = whole_arm(arm, q)
     held = _guard(full_arm)
     answers = []

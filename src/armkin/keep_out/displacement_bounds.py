@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def levers(guard: Guard, slide_out: Array) -> Array:
-    """Of every pair how far its bodies come nearer, at most, for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
+    """How far the bodies of every pair come nearer, at most, for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
 
     out: (n,) [mm] how far a slide is out at most during the motion. Seen from the earlier body (an obstacle: from
     the base) only the joints after it move the later one. A point's distance from axis j is at most the way that

@@ -120,7 +120,7 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 
 def transforms(xyz: Array, rpy: Array) -> Array:
-    """As `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
+    """The `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
     matrices = np.zeros((*xyz.shape[:-1], 4, 4))
     every, place, angles = matrices.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
     for start in range(0, len(every), BLOCK_ROWS):

@@ -96,5 +96,5 @@ def _rounded_way(corners: Array, blend: float) -> Knots:
 
 
 def _scale_joints(path: Knots, unit: Array) -> Knots:
-    """The same in [rad | mm]."""
+    """The path's joint values and their derivatives times `unit` (n,): in [rad | mm]."""
     return Knots(path.s, path.q * unit, path.d * unit)

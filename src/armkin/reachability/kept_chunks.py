@@ -18,7 +18,7 @@ class NumberedChunk(Protocol):
 
     @property
     def number(self) -> int:
-        """Its place among all, from 0."""
+        """The chunk's place among all, from 0."""
 
 
 Chunk = TypeVar("Chunk", bound=NumberedChunk)

@@ -241,7 +241,7 @@ def _place_result(
 
 
 def _add_postures(question: PlaceQuestion, place: Place) -> Place:
-    """The same with, for each target reached from the best place, the legal posture that is nearest to home."""
+    """The place with the legal posture nearest to home for each target that is reached from the best place."""
     position, turn = place.xyz[:2], float(place.yaw[place.best[2]])
     plan = next((path.plan for path in place.planned if path.index == place.best and path.plan is not None), None)
     if plan is not None and plan.held:
@@ -257,7 +257,7 @@ def _add_postures(question: PlaceQuestion, place: Place) -> Place:
 
 
 def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, room: Room) -> Place:
-    """The same with the best places planned; one that cannot be planned does not reach all."""
+    """The place with its best places planned; one that cannot be planned does not reach all."""
     if why := place_path.missing_rates_text(question.arm):
         return replace(place, unplanned=why)
     tried: list[PathFromPlace] = []

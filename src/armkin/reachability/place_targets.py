@@ -98,7 +98,7 @@ def reached_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int6
 
 
 def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int64]:
-    """The same of a redundant joint's values: the most of what is reached with it held at each of its values.
+    """How many targets are reached with a redundant joint held at its best value, from positions (P, 2): (P, K).
 
     Keep-outs only take away: a place is asked among them where more is reached without them than is known.
     """
@@ -154,7 +154,7 @@ def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
 
 
 def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """The same of what is legal (P, N, K); of ways that one branch does not carry, less than all."""
+    """How many targets are legal, (P, N, K) -> (P, K); of ways that one branch does not carry, less than all."""
     if not question.ways:
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
     counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
@@ -189,7 +189,7 @@ def _legal_yaws(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_]:
 
 
 def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] | None:
-    """The same by what the joints behind joint 1 do at a target's distance from it; None without a closed form."""
+    """Which targets are reached, (P, N, K), by what the joints behind joint 1 do at their distance; None: no form."""
     high = question.targets.copy()
     if question.task.position > 2:
         high[:, 2] -= question.z
@@ -238,7 +238,7 @@ def _legal_turns(question: PlaceQuestion, values: list[Array], valid: NDArray[np
 
 
 def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
-    """The same by a solve for each yaw, many together."""
+    """At which yaws targets (M,) are reached from places (M, 2), by a solve for each yaw, many together: (M, K)."""
     K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
     cosine, sine = np.cos(turns), np.sin(turns)
@@ -350,7 +350,7 @@ def targets_from(question: PlaceQuestion, position: Array, turn: float) -> Array
 
 
 def _shift_targets(question: PlaceQuestion, position: Array) -> Array:
-    """The same of an arm that is not turned."""
+    """The targets in the frame of an arm at a position, or each from a position (N, 2), that is not turned."""
     targets = question.targets.copy()
     shift = np.concatenate([position, np.full((*position.shape[:-1], 1), question.z)], axis=-1)
     target_positions = positions_of(question.task, targets)

@@ -104,7 +104,7 @@ class Grid:
 
     @property
     def orientations(self) -> int:
-        """Of a cell."""
+        """Number of orientations of a cell."""
         return self.directions_count * self.rolls_count
 
     @property

@@ -83,7 +83,7 @@ class Reach:
 
     @property
     def orientations(self) -> int:
-        """Of a cell."""
+        """Number of orientations of a cell."""
         return self.grid.orientations
 
 

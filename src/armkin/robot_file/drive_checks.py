@@ -73,7 +73,7 @@ _OF_DRIVES = {"spindle": _check_spindle, "bus": _check_bus_servo, "stepper": _ch
 
 
 def _missing_keys(drive: Drive, *keys: str) -> str:
-    """Those of the keys that are not given: a and b."""
+    """The keys that are not given, in words: a and b."""
     return " and ".join(key for key in keys if getattr(drive, key) is None)
 
 

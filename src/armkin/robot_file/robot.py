@@ -28,7 +28,7 @@ class RobotFile(RobotKeys):
         return self._sha256
 
     def with_tool(self, numbers: Sequence[float]) -> Self:
-        """The same file with another tool: x, y, z, roll, pitch, yaw [mm, deg]. Raises UsageError for what is none."""
+        """The file with another tool: x, y, z, roll, pitch, yaw [mm, deg]. Raises UsageError for what is none."""
         try:
             tool = Pose(xyz=tuple(numbers[:3]), rpy=tuple(numbers[3:]))  # type: ignore[arg-type]
         except ValidationError as error:

@@ -282,7 +282,7 @@ def parse_triple(text: str | None, default: tuple[float, ...], place: str) -> tu
 
 
 def _parse_floats(text: str, count: int, place: str) -> tuple[float, ...]:
-    """So many finite numbers, separated by blanks."""
+    """The `count` finite numbers of a text, separated by blanks."""
     words = text.split()
     if len(words) != count or not all(_NUMBER.fullmatch(word) for word in words):
         expected = "a number" if count == 1 else f"{count} numbers"

@@ -47,7 +47,7 @@ class QuickIk:
         return self._built is not None
 
     def ik(self, arm: Arm, targets: Array, task: str | None, near: Array, **more: Any) -> Solutions:
-        """As `armkin.ik`."""
+        """Solutions as of `armkin.ik`: by machine code once that is built."""
         if self._built is None or arm is not self._arm:
             return ik(arm, targets, task, near=near, **more)
         return self._built.ik(targets, task, near, **more)

@@ -67,7 +67,7 @@ def _held_values(arm: Arm, free: Redundancy) -> Array:
 
 
 def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
-    """Of each cell the share of orientations that are reached at one of the values, free of hits."""
+    """Share of each cell's orientations that are reached at one of the values, free of hits."""
     arm, j = grid.arm, free.joint
     M, count = grid.azimuths, grid.orientations
     centres = np.repeat(grid.rings, M * count, axis=0)

@@ -166,4 +166,4 @@ class StepperArm(Backend):
 
     @abstractmethod
     def _explain(self, error: LinkError) -> LinkError:
-        """The same error, with where the arm has come to rest."""
+        """The error, with where the arm has come to rest."""

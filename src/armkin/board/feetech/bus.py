@@ -52,7 +52,7 @@ class Bus:
         raise LinkError(f"servo {servo} on {self.port.name} does not take {value} for register {register.address}")
 
     def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, bytes]:
-        """The same registers of several servos, asked together; those that stay silent again one by one."""
+        """Contents of the same registers of several servos, asked together; who stays silent is asked again alone."""
         answers = self._ask(packet.sync_read(servos, address, size), servos, size, tries=2)
         for servo in servos:
             if servo not in answers:

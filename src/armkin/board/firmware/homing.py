@@ -46,7 +46,7 @@ class Search:
     rate: tuple[int, ...]  # per axis of the board
 
     def frame(self, tag: int) -> bytes:
-        """Its HOME frame."""
+        """The payload of the HOME frame that starts this search."""
         return protocol.home(
             tag,
             switch=self.switch,
@@ -76,7 +76,7 @@ def searches(
 
 
 def _homing_orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
-    """Of the joints that have a homing: joint -> its order. Raises NoHomingError for others that are not left out."""
+    """Joint -> its order, of joints that have a homing. Raises NoHomingError for others that are not left out."""
     orders = {j: homing.order for j in joints if (homing := arm.homing[j]) is not None}
     bare = [arm.joint_names[j] for j in joints if j not in orders]
     if bare and not (rest_at_home and orders):

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Machine(Protocol):
-    """Of an arm on its board, what is asked here: `firmware_machine.FirmwareMachine`."""
+    """What this module asks of an arm on its board: `firmware_machine.FirmwareMachine` answers it."""
 
     arm: Arm
     session: Session
@@ -39,16 +39,16 @@ class Machine(Protocol):
         """Known, retained or lost."""
 
     def counts(self) -> tuple[int, ...]:
-        """Of every motor."""
+        """Counts at which every motor stands, (motors,)."""
 
     def joints(self) -> Array:
         """Joint values (n,) [rad | mm]."""
 
     def describe(self) -> str:
-        """Where it stands, in words."""
+        """Where the arm stands, in words."""
 
     def standing_text(self) -> str:
-        """The same, and what it means for the next command."""
+        """Where the arm has come to rest, and what that means for the next command."""
 
 
 def explain_error(machine: Machine, error: DeviceError) -> LinkError:

@@ -108,7 +108,7 @@ def printer_cfg(axes: Sequence[Axis]) -> str:
 
 
 def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
-    """Those sections as Klipper tells them: section -> option -> value."""
+    """The settings of the axes' sections as Klipper tells them: section -> option -> value."""
     sections: dict[str, dict[str, Any]] = {
         "printer": {"kinematics": "none", "max_velocity": RATE, "max_accel": MAX_ACCEL}
     }

@@ -154,7 +154,7 @@ class KlipperMachine(StepperArm):
         self._read()
 
     def _explain(self, error: LinkError) -> LinkError:
-        """The same error, with where the arm has come to rest if Klipper still tells."""
+        """The error, with where the arm has come to rest if Klipper still tells."""
         try:
             self._settle()
         except LinkError:

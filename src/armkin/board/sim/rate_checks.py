@@ -57,7 +57,7 @@ class Velocity:
         self._excess = [(0, 0)] * len(image.axes)  # up, down; a quarter of a velocity
 
     def copy(self) -> Velocity:
-        """The same, to go on from."""
+        """A copy of these velocities, to go on from."""
         twin = Velocity(self.board, self.image)
         twin._last_ends, twin._excess = list(self._last_ends), list(self._excess)
         twin._last_pace, twin._pace = self._last_pace, self._pace

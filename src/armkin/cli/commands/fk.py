@@ -102,7 +102,7 @@ class FkQuestions:
 def _arm_and_poses(
     robot: str | None, q: list[str] | None, scene: str | None, tool: str | None
 ) -> tuple[Arm, list[list[float]]]:
-    """As `piped_answers.arm_and_poses`; that module is imported for standard input alone, so fk starts sooner."""
+    """The arm and its poses; `piped_answers` is imported for standard input alone, so fk starts sooner."""
     if q:
         arm = arguments.load_arm(arguments.required_robot(robot), scene, tool)
         return arm, [arguments.joints(arm, q)]

@@ -123,7 +123,7 @@ def ik(
 
 
 def _request_with_solver(request: choose_branch.Request, task: str, *, compiled: bool) -> choose_branch.Request:
-    """The same where position first fits the arm; compiled: by machine code, which is built if it is not there yet."""
+    """The request if position first fits the arm; compiled: it is solved by machine code, built if it is missing."""
     from armkin.inverse import choose_branch
     from armkin.inverse.redundant.position_first import check_arm as position_first_is_for
 
@@ -241,7 +241,7 @@ class IkQuestions:
         return answered.table, ~answered.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
-        """By way of an object a row, for what is not asked of each row by itself."""
+        """What `table` returns, by way of an object a row, for what is not asked of each row by itself."""
         import numpy as np
 
         from armkin.columns.table import table_of_records

@@ -26,7 +26,7 @@ class Goals(NamedTuple):
     near: Array
 
     def of(self, rows: Int) -> Goals:
-        """Those of some rows."""
+        """The goals of some rows."""
         return Goals(self.arm, self.task, self.target[rows], self.near[rows])
 
 

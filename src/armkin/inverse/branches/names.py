@@ -59,7 +59,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
 
 
 def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
-    """Of each word of the class on which branches (b0, b1, b2) the second of its two names is the first sign's."""
+    """On which branches (b0, b1, b2) each word of the class has its second name for the first sign."""
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
     away = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
@@ -79,7 +79,7 @@ def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -
 
 
 def _elbow_swapped(arm: Arm, q: Array, valid: Bool, shape: tuple[int, ...]) -> Bool:
-    """Of branches (M, B, n), on axes (M, b0, b1, b2), where the second of two elbows is the upper one: (b0, b1, b2)."""
+    """Where the second of two elbows is the upper one, (b0, b1, b2), of branches (M, B, n) on axes (M, b0, b1, b2)."""
     heights, level = _elbow_heights(arm, q)
     heights = np.where(valid, heights, np.nan).reshape(shape)
     level = np.where(valid, level, np.inf).reshape(shape)

@@ -65,7 +65,7 @@ class Recorded:
         return [*values, miss, candidates.doubt.edge, candidates.doubt.free]
 
     def measured(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
-        """The same, and behind the squared residual its two parts: of lengths [reaches] and of small angles [rad]."""
+        """What `candidates` returns, and behind the residual those of lengths [reaches] and of small angles [rad]."""
         assert self.geometry.pairs is not None
         candidates = self.geometry.pairs(goal, prefer)
         *values, miss, edge, free = self._of(candidates, goal)
@@ -219,7 +219,7 @@ def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
 
 @lru_cache(maxsize=256)
 def recorded_formula(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
-    """The same for all calls of one solver."""
+    """The recorded formula, one and the same for all calls of a solver."""
     return Recorded(arm, task, geometry)
 
 

@@ -66,7 +66,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 
 def _distinct_places(arm: Arm, place: Array, second: Array) -> Array:
-    """Of places (N, P, n) `MAX_PLACES` with the least second singular values (N, P), each crossing once; else nan."""
+    """`MAX_PLACES` of places (N, P, n) with the least second singular values (N, P), each crossing once; else nan."""
     distinct = np.full((len(place), MAX_PLACES, arm.n), np.nan)
     for k in np.flatnonzero(np.isfinite(second).any(axis=1)):
         crossing = np.flatnonzero(np.isfinite(second[k]))

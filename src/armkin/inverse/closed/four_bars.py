@@ -66,7 +66,7 @@ def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
 
 
 def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
-    """Of postures q (N, S, B, n), nan where there is none, those that stand for the circuits of four bars.
+    """Which postures q (N, S, B, n), nan where there is none, stand for the circuits of four bars.
 
     near: (N, n). The S postures of a column are of one self-motion, moved by the joints that differ. Returns (N, S, B)
     all but those of four bars that are not the nearest to `near` of their circuit, and (N, B, n) a posture of each

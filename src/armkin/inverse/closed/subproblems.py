@@ -47,7 +47,7 @@ _current = ContextVar("precision", default=IN_DOUBLE)
 
 
 def precision() -> Precision:
-    """Of the numbers that formulas are evaluated, or recorded, for."""
+    """Precision of the numbers that formulas are evaluated, or recorded, for."""
     return _current.get()
 
 
@@ -93,7 +93,7 @@ class Doubt:
     __ror__ = __or__
 
     def where(self, real: Truth) -> Doubt:
-        """The same, none where it is not real: a joint that would be free there is none of a branch."""
+        """This doubt, none where a branch is not real: a joint that would be free there is none of a branch."""
         return Doubt(self.edge & real, self.free & real)
 
 
@@ -118,7 +118,7 @@ class Candidates(NamedTuple):
         return [arrays.arctan2(s, c) if x is None else x for (c, s), x in zip(self.pairs, known, strict=True)]
 
     def reversed(self) -> Candidates:
-        """The same for the chain walked the other way."""
+        """The candidates for the chain walked the other way."""
         return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
 
 

@@ -111,7 +111,7 @@ def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
 
 
 def best_answers(answers: Answers, count: int, most: int) -> Array:
-    """Of every pose (N = count) at most so many answers, those of the smallest residual: (N, B, 6), NaN past them."""
+    """At most so many answers of every pose (N = count), those of the smallest residual: (N, B, 6), NaN past them."""
     return _table(rows_of(answers, np.lexsort((answers.residual, answers.pose))), count, most)
 
 

@@ -109,7 +109,7 @@ def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
 
 
 def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _PencilRoots:
-    """Of roots (N, size) and their vectors (N, size, size) those whose tilt is below tolerance."""
+    """The roots (N, size), with their vectors (N, size, size), whose tilt is below tolerance."""
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
     pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
     # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
@@ -134,7 +134,7 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
 
 
 def _part_equal_roots(pencil: Pencil, single: _PencilRoots, vectors: NDArray[np.complex128]) -> _PencilRoots:
-    """The same, a root that several solutions share with the vectors of these: see `equal_roots`."""
+    """The single roots, each that several solutions share with the vectors of these: see `equal_roots`."""
     count = len(single.pose)
     # rounding made a complex pair of some
     twin = np.flatnonzero((single.tilt > 0) & (single.tilt < tol.EQUAL_ROOTS))

@@ -158,7 +158,7 @@ def null_space(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Ar
 
 
 def _smallest(arm: Arm, task: Task, S: Array) -> tuple[Array, Int]:
-    """Of singular values (M, k) the one that decides (M,), and how many directions are lost (M,)."""
+    """The singular value that decides (M,), of S (M, k), and how many directions are lost (M,)."""
     full = np.zeros((len(S), arm.n))
     full[:, : S.shape[1]] = S
     # a task with an axis has one more row than constraints
@@ -177,7 +177,7 @@ class Linear(NamedTuple):
 
     @classmethod
     def linearise(cls, arm: Arm, task: Task, q: Array, target: Array) -> Linear:
-        """Of postures (M, n) and their targets."""
+        """The residuals and Jacobians of postures (M, n) and their targets."""
         r, J = scaled(arm, task, q, target)
         return cls(r, *np.linalg.svd(J))
 

@@ -86,7 +86,7 @@ def _frame(v: Array) -> Array:
 
 
 def _circles(srs: ArmAngle, target: Array) -> _Circles:
-    """Those of targets (N, 4, 4)."""
+    """The circles of elbows that reach targets (N, 4, 4)."""
     L, u, p = srs.arm.link, srs.upper, srs.fore
     hand = inverse(L[0]) @ target @ inverse(L[7])
     d = hand[:, :3, :3] @ srs.wrist + hand[:, :3, 3] - srs.shoulder
@@ -180,7 +180,7 @@ class _Samples(NamedTuple):
 
 
 def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
-    """Those of circles M; near: (M, n)."""
+    """Samples of the curves of circles M; near: (M, n) [rad]."""
     arm = srs.arm
     psi = _special_angles(srs, circles.R, near)
     M, K = psi.shape

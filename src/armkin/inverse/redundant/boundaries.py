@@ -49,7 +49,7 @@ class _Rooted:
         return self + other * -1.0
 
     def product(self) -> Complex:
-        """Of both signs of the root."""
+        """The product of the numbers of both signs of the root."""
         return np.asarray(self.x * self.x - self.square * (self.y * self.y))
 
 

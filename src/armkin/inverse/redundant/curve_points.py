@@ -46,7 +46,7 @@ def onto_curves(follower: Follower, row: Int, q: Array, last: Array, enough: flo
 
 
 def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
-    """As `onto_curves`, of postures that stay in the cache."""
+    """Postures moved as `onto_curves` does, so few that they stay in the cache."""
     arm, task, unit = follower.arm, follower.free.task, radian_or_reach(follower.arm)
     target = follower.target[row]
     q, tangent = q.copy(), last.copy()
@@ -80,7 +80,7 @@ class Ways(NamedTuple):
 
     @classmethod
     def between(cls, follower: Follower, a: Points, b: Points) -> Ways:
-        """Those between points, which follow an arc of a circle to the sixth order."""
+        """Cubics between points, which follow an arc of a circle to the sixth order."""
         chord = newton.difference(follower.arm, b.q, a.q)
         cosine = np.maximum((a.tangent * b.tangent).sum(axis=1), -1.0)
         size = 2.0 * np.sqrt((chord * chord).sum(axis=1)) / (1.0 + np.sqrt(0.5 * (1.0 + cosine)))

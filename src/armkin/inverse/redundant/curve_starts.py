@@ -150,7 +150,7 @@ def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int)
 def _off_curves_at(
     follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int
 ) -> tuple[Int, Array]:
-    """Those with the joint at a value."""
+    """Answers (M, n) off the curves with the joint at a value, and whose they are (M,)."""
     held_arm = arm_without(follower.arm, ((follower.arm.joint_names[joint], value),))
     s = follower.ik(held_arm, follower.target, follower.free.task.name, examine=False)
     whose, branch = np.nonzero(s.valid)

@@ -149,7 +149,7 @@ class _Rows:
         self.added = 0  # targets
 
     def add(self, curves: Curves) -> None:
-        """Those of the targets that follow."""
+        """Add the curves of the targets that follow."""
         pieces, begin = curves.pieces, self.added
         self.added += len(curves.complete)
         rows = slice(begin, self.added)
@@ -171,7 +171,7 @@ class _Rows:
         self.parts.append((begin + pieces.row[order], q[order], interval, pieces.legal[order], pieces.branch[order]))
 
     def add_points(self, task: Task, target: Array, search: bool) -> None:
-        """Of targets (N, ...) without a piece a posture that solves them: near, or, to search, what many starts find.
+        """Add a posture that solves each target (N, ...) without a piece: near, or, to search, what many starts find.
 
         All postures of a stretched arm may lie within less than a sample, or be one.
         """
@@ -216,7 +216,7 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
     least = motion(arm, best, near)
 
     def costs(rows: Int, t: Array) -> Array:
-        """Of legal postures; better ones are kept."""
+        """Motion (R,) from near to the legal postures at t, inf where none is legal; better ones are kept."""
         q, legal = curves.at(rows_of(curves.pieces, rows), t)
         cost = np.where(legal, motion(arm, q, near[rows]), np.inf)
         better = cost < least[rows]

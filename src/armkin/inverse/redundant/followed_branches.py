@@ -34,7 +34,7 @@ class Followed(NamedTuple):
 
     @classmethod
     def along(cls, follower: Follower) -> Followed:
-        """Of some targets; in two ways: those of which all places are known where something changes, and others."""
+        """Curves of the targets in two ways: those of which all places of a change are known, and others."""
         N = len(follower.target)
         parts, short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
         of = boundaries(follower.arm) if follower.free.joint == follower.arm.n - 1 else None
@@ -56,7 +56,7 @@ class Followed(NamedTuple):
         return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """As `Turning.at`."""
+        """Postures of pieces at values of the joint, and whether they are legal: as `Turning.at`."""
         return self.follower.legal_branch(pieces.row, pieces.branch, parameter)
 
 

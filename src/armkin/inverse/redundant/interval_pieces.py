@@ -76,7 +76,7 @@ def holding_none(good: Bool, row: Int, first: Int, length: Int) -> Bool:
 
 
 def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
-    """Of each run the least costly sample, counted from its first one: cost (M, K), a run goes round the end."""
+    """The least costly sample of each run, counted from its first one: cost (M, K), a run goes round the end."""
     index = numbers_within(count)
     K = cost.shape[1]
     sample = np.repeat(first, count) + index

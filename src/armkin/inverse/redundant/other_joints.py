@@ -104,7 +104,7 @@ class Follower(NamedTuple):
         return q
 
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
-        """Of a closed form all branches (M, B, n), real or not, and what they miss (M, B)."""
+        """All branches (M, B, n) of a closed form, real or not, and what they miss (M, B)."""
         axes = _recorded_form(self.arm, self.free)[1]
         columns = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         missed = np.empty(columns.shape[1:])
@@ -225,7 +225,7 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
 
 
 def _next_sample(x: NDArray[Any]) -> NDArray[Any]:
-    """Of the next sample round the turn."""
+    """The values x (..., K) of the next sample round the turn."""
     return np.roll(x, -1, axis=-1)
 
 

@@ -38,7 +38,7 @@ class Changes(NamedTuple):
         return np.asarray(np.where(self.set_before, self.k + offset, self.k + 1 - offset) % K)
 
     def value(self, offset: int, t: Array) -> Array:
-        """As `sample`, the value of the joint of samples at t (N, K), whole turns on if it goes over the end."""
+        """The joint's value, of samples at t (N, K), where `sample` is; whole turns on if that goes over the end."""
         return value_at(t, self.row, np.where(self.set_before, self.k + offset, self.k + 1 - offset))
 
 
@@ -153,7 +153,7 @@ def _summarise(sampled: Sampled, rows: Int, sure: bool) -> Summary:
 
 
 def nearest_other(q: Array, branch: Int) -> tuple[Array, Int, Array]:
-    """Of branches (M,) among postures (M, B, n) the nearest other one: how far its joints are (M, n), which one (M,),
+    """The nearest other one to branches (M,) among postures (M, B, n): how far its joints are (M, n), which one (M,),
     squared (M,)."""
     index = np.arange(len(q))
     away = wrap_angle(q - q[index, branch][:, None])
@@ -165,7 +165,7 @@ def nearest_other(q: Array, branch: Int) -> tuple[Array, Int, Array]:
 
 
 def _runs(sampled: Sampled, good: Bool, rows: Int) -> Runs:
-    """Those of good samples (S, K, B)."""
+    """The runs of good samples (S, K, B)."""
     K, B = good.shape[1:]
     samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (good, sampled.legal))
     cost = sampled.cost.transpose(0, 2, 1).reshape(-1, K)

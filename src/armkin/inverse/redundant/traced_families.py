@@ -30,7 +30,7 @@ STEPS = 12  # steps of the golden section
 
 
 def trace_families(follower: Follower) -> Iterator[Traced]:
-    """Those of all targets, some at a time."""
+    """The traced families of all targets, some at a time."""
     chains = curves_of(follower)
     point = np.append(0, np.cumsum(chains.counts))
     for k in range(0, len(follower.target), AT_ONCE):
@@ -76,7 +76,7 @@ class Traced(NamedTuple):
         return curves._replace(pieces=pieces, short=(extent > 0) & (extent < tol.REACH))
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
-        """As `Turning.at`."""
+        """Postures of pieces at a parameter, and whether they are legal: as `Turning.at`."""
         curve = self.curve[pieces.row, pieces.branch]
         floor = np.floor(parameter)
         point = self.begin[curve] + floor.astype(np.intp) % self.counts[curve]

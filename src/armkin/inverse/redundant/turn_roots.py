@@ -51,7 +51,7 @@ def _cells(degree: int) -> tuple[Array, float, Array]:
 
 @lru_cache(maxsize=8)
 def _coefficients(degree: int) -> NDArray[np.complex128]:
-    """Those of exp(i k t), k from 0 to degree + TAIL, of values at samples: (M, degree + TAIL + 1)."""
+    """Matrix from values at samples to coefficients of exp(i k t), k from 0: (M, degree + TAIL + 1)."""
     t = sampled_at(degree)
     return np.asarray(np.exp(-1j * t[:, None] * np.arange(degree + TAIL + 1)) / len(t))
 
@@ -73,7 +73,7 @@ def sampled_at(degree: int) -> NDArray[np.complex128]:
 
 
 def roots(values: NDArray[np.complex128], degree: int) -> Roots:
-    """Those of polynomials from values (F, M) at `sampled_at`."""
+    """The real roots of polynomials from their values (F, M) at `sampled_at`."""
     middle, half, series = _cells(degree)
     F, order = len(values), np.arange(TERMS)
     c = values @ _coefficients(degree)
@@ -110,7 +110,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
 
 
 def _zero_of_series(a: Array) -> Array:
-    """Of series (R, TERMS), monotone from -1 to 1, the root (R,)."""
+    """The root (R,) of series (R, TERMS) that are monotone from -1 to 1."""
     x = np.zeros(len(a))
     for _ in range(STEPS):
         value, slope = a[:, -1].copy(), np.zeros(len(a))

@@ -78,7 +78,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
 
 
 def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
-    """Those of the targets whose self-motions are known in closed form, with their seeds."""
+    """The targets whose self-motions are known in closed form, with their seeds."""
     settled: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
         return settled

@@ -128,7 +128,7 @@ def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Arra
 
 
 def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
-    """Of P pairs, `way` (P, n) apart, with the inverses of their Jacobians: which stand alone, and which meet, (P,).
+    """Which of P pairs, `way` (P, n) apart, stand alone, and which meet, (P,), by the inverses of their Jacobians.
 
     g along u is zero at both ends; a curve that keeps all other numbers of the target has the slope 1 / (v' J^-1 u).
     """

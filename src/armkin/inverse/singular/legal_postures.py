@@ -27,7 +27,7 @@ FINE_STEP = np.deg2rad(0.1)  # step [rad] between the postures of a self-motion 
 
 
 def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
-    """The same branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
+    """The branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
 
     goals, batch: N targets and their branches. The legal posture takes the place of the one that it shares a
     self-motion with, as `near` would.
@@ -81,7 +81,7 @@ def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
 
 
 def with_free_postures(goals: Goals, batch: Batch) -> Batch:
-    """The same branches; of singular targets each that hits something or is outside limits, at the nearest posture of
+    """The branches; of singular targets each that hits something or is outside limits, at the nearest posture of
     its self-motion that is neither, if there is one to 0.1 degrees.
     """
     arm, task, target, near = goals

@@ -141,7 +141,7 @@ def _first_columns(arm: Arm, motions: _Motions, loose: Bool) -> tuple[Int, Bool]
 
 
 def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
-    """Of which targets (K,) every listed self-motion has a posture that loses one direction alone."""
+    """For which targets (K,) every listed self-motion has a posture that loses one direction alone."""
     k, m = np.nonzero(listed)
     for _ in range(2):  # the posture that is listed; else, for it may be where bars are in one line, all others
         if not len(k):

@@ -234,7 +234,7 @@ def _polynomials(
 def _nodes(
     arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
 ) -> tuple[Bool, Array, Array, Array]:
-    """Of the curves of `_polynomials` the nodes: which curves (M,) have all of them, the joints' ways (NODES, M, n),
+    """Nodes of the curves of `_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
     the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
 
     Each is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems,

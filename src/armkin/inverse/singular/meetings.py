@@ -77,7 +77,7 @@ def _directions(k: int) -> tuple[Array, Array, float]:
 
 
 def _sizes(forms: Array, products: Array, far: float) -> tuple[Array, Array]:
-    """Of forms (m, k, pairs) in directions, by their products (pairs, P): (m, P); and by which none is zero: (m,).
+    """Sizes (m, P) of forms (m, k, pairs) in directions of products (pairs, P), and by which none is zero: (m,).
 
     As far [rad] from the next of these directions a form differs by twice its largest value at most.
     """
@@ -89,7 +89,7 @@ def _sizes(forms: Array, products: Array, far: float) -> tuple[Array, Array]:
 def _tangents(
     arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array
 ) -> tuple[Bool, Int, Array]:
-    """Of which postures (M, n) the directions of curves are known, and these: whose (m,), and which (m, n).
+    """For which postures (M, n) the directions of curves are known, and these: whose (m,), and which (m, n).
 
     As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for all lost left vectors u:
     quadratic forms of v (docs/solution.md). Curves leave along their common zeros; where there is none, it grows all

@@ -97,7 +97,7 @@ def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, most: Array
 
 
 def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
-    """The same branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
+    """The branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
 
     In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
     others, the target is a boundary.

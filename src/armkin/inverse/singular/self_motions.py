@@ -26,7 +26,7 @@ STEPS = np.array([[STEP], [10 * STEP]])  # steps [rad] along a null direction: a
 
 
 def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: Bool, curve: Bool) -> None:
-    """Of self-motions through each other keep the one of more joints, and no root of high order beside or on one.
+    """Keep the one of more joints of self-motions through each other, and no root of high order beside or on one.
 
     Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves; resting: (K, M, n) joints
     that do not move along the one direction that it loses: a curve that moves such a joint is another. `near`, the
@@ -76,7 +76,7 @@ def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, tar
 
 
 def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, linked: Bool, tube: Array) -> None:
-    """Of chosen postures (K, M) of self-motions that turn out to be the same keep the nearest to `near`: change chosen.
+    """Keep the posture nearest to `near` of those chosen (K, M) whose self-motions are the same: change chosen.
 
     q: (K, M, n); curve: (K, M, n) the joints that a posture's self-motion moves; ended: (K, M) those of which both ends
     are known, and all that is between; linked: (K, M, M) which others, not followed to their ends, are on each one's;
@@ -256,7 +256,7 @@ def _normals(held: Array) -> Array:
 
 
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
-    """The same in parts, some of them several times.
+    """What `null_directions` returns, in parts, some directions several times.
 
     In a null space of several dimensions a self-motion may hide between the basis vectors: there every joint
     is pushed as far as the null space lets it, and of k dimensions any k - 1 joints are held.
@@ -275,7 +275,7 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
 
 
 def _long_directions(row: Int, push: Array) -> tuple[Int, Array]:
-    """Those of directions (C, m, n) of postures (m,) that are long enough, of length one."""
+    """The directions (C, m, n) of postures (m,) that are long enough, made of length one, and whose they are."""
     size = np.linalg.norm(push, axis=2)
     far = size > 0.1
     return np.broadcast_to(row, size.shape)[far], push[far] / size[far][:, None]

@@ -24,7 +24,7 @@ Pair = tuple[int, int, float]  # joints about one line, and the way of the first
 
 
 def list_swept(goals: Goals, decision: Examined) -> Examined:
-    """The same, surfaces listed by the curves that they are swept from."""
+    """The decision with surfaces listed by the curves that they are swept from."""
     if goals.task.orientation == "none":  # sums of joint values are those of all joints
         return decision
     for k in np.flatnonzero(decision.surface):
@@ -38,7 +38,7 @@ def no_more(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
 
 
 def _with_curves(goals: Goals, decision: Examined, k: np.intp) -> Examined:
-    """The same, with a posture of each curve in place of those on surfaces of target k.
+    """The decision with a posture of each curve in place of those on surfaces of target k.
 
     Where three joints are about one line, the two of them that sweep the most surfaces tell.
     """
@@ -95,7 +95,7 @@ def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
 
 
 def _about_one_line(J: Array, pair: Pair) -> Bool:
-    """Of which Jacobians (M, r, n) the columns of two joints are equal or opposite: (M,).
+    """In which Jacobians (M, r, n) the columns of two joints are equal or opposite: (M,).
 
     Where an elbow is stretched they are known to the root of rounding.
     """

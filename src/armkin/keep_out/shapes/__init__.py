@@ -30,10 +30,10 @@ class Shape(Protocol):
         """Signed distance of points: (3, ...) -> (...)."""
 
     def triangles(self, size: float) -> Array:
-        """Its surface for pictures: (T, 3, 3); size: how far one without end is drawn [mm]."""
+        """The surface for pictures, triangles (T, 3, 3) [mm]; size: how far one without end is drawn [mm]."""
 
     def c_function(self) -> tuple[str, list[float]]:
-        """Its function in C and what that is given."""
+        """The name of the shape's distance function in C, and the numbers that it is given."""
 
 
 _OF: dict[str, Callable[[Entry], Shape]] = {

@@ -63,7 +63,7 @@ class Box:
         return self.corners()[[part for a, b, c, d in faces for part in ((a, b, c), (a, c, d))]]
 
     def c_function(self) -> tuple[str, list[float]]:
-        """Its function in C and what that is given."""
+        """The name of the box's distance function in C, and its centre [mm], axes and half sides [mm]."""
         return "box", [*self.centre.tolist(), *self.axes.T.ravel().tolist(), *self.half.tolist()]
 
 

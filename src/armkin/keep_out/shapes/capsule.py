@@ -42,7 +42,7 @@ class Capsule:
         return tube(self.begin, self.end, self.radius)
 
     def c_function(self) -> tuple[str, list[float]]:
-        """Its function in C and what that is given."""
+        """The name of the capsule's distance function in C, and its ends and radius [mm]."""
         return "capsule", [*self.begin.tolist(), *self.end.tolist(), self.radius]
 
 

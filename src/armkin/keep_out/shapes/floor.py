@@ -35,7 +35,7 @@ class Floor:
         return corners[[[0, 1, 2], [0, 2, 3]]]
 
     def c_function(self) -> tuple[str, list[float]]:
-        """Its function in C and what that is given."""
+        """The name of the floor's distance function in C, and its height [mm]."""
         return "floor", [self.height]
 
 

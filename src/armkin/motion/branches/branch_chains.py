@@ -38,7 +38,7 @@ class Chain:
 
     @property
     def last(self) -> int:
-        """Its last sample."""
+        """Index of the chain's last sample."""
         return self.first + len(self.q) - 1
 
     @cached_property
@@ -212,7 +212,7 @@ def _possible_starts(chains: list[Chain], N: int) -> Bool:
 
 
 def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
-    """Of the chains that carry from sample i so far the one with the least motion, as a run."""
+    """The run of the chain with the least motion, of those that carry from sample i to `last_sample`."""
     best = min((c for c in choices if c.carries_to(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
     return Run(best, i, last_sample)
 

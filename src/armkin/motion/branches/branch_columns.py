@@ -51,7 +51,7 @@ class Columns:
         return Columns(*parts, self.names, self.complete)
 
     def pad_to(self, B: int) -> Columns:
-        """The same with B columns of branches at least."""
+        """The samples with B columns of branches at least."""
         return Columns(
             self.s,
             _pad(self.q, B),
@@ -64,7 +64,7 @@ class Columns:
         )
 
     def insert_rows(self, rows: Int, new: Columns) -> Columns:
-        """These samples with others before the rows `rows`; the links of both stay, as far as they have any."""
+        """The samples with others before the rows `rows`; the links of both stay, as far as they have any."""
         B = max(self.q.shape[1], new.q.shape[1])
         wide, new = self.pad_to(B), new.pad_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
@@ -196,7 +196,7 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
 
 
 def _pad(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
-    """The same with B columns on axis 1."""
+    """The values with B columns on axis 1 at least, the new ones `fill`."""
     missing = B - values.shape[1]
     if missing <= 0:
         return values

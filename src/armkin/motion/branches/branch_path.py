@@ -142,7 +142,7 @@ def starts_at(chain: Chain, q: Array) -> bool:
 def _fastest_run(
     arm: Arm, route: Route, s: Array, runs: list[Run], near: Array, pace: Pace, fixed: Array | None
 ) -> Run:
-    """Of runs that take nearly the least time the one that is soonest begun; of equals the first."""
+    """The run that is soonest begun, of those that take nearly the least time; of equals the first."""
     seconds = np.array([_run_time(arm, route, s, run, near, pace) for run in runs])
     return min(
         (run for run, t in zip(runs, seconds, strict=True) if t <= seconds.min() * 1.0005),

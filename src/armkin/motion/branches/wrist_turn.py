@@ -84,7 +84,7 @@ def add_wrist_chains(
 
 @lru_cache(maxsize=256)
 def _volumes_at_three(arm: Arm) -> tuple[float, float, float]:
-    """Of the wrist's axes where joint 5 has turned by 0, 90 and 180 degrees."""
+    """Volumes [1] that the wrist's axes span where joint 5 has turned by 0, 90 and 180 degrees."""
     tried = np.tile(arm.home, (3, 1))
     tried[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
     axes = jacobian(arm, tried)[:, 3:, 3:]

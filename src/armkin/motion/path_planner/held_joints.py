@@ -91,7 +91,7 @@ def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> 
 
 
 def _unlock_stretch(stretch: Stretch, arm: Arm, held: Mapping[str, float]) -> Stretch:
-    """The same motion with the held joints at rest."""
+    """The stretch in all joints of the arm, the held ones at rest."""
     if isinstance(stretch, Smoothed):
         return replace(stretch, curve=_unlock_curve(stretch.curve, arm, held))
     if isinstance(stretch, Curve):

@@ -133,7 +133,7 @@ class PathPlan:
 
     @property
     def turned(self) -> float | None:
-        """By how much the tool is turned at wrist singularities [rad]; None: it never is."""
+        """The most by which the tool is turned at a wrist singularity [rad]; None: it never is."""
         return max((singularity.turned for singularity in self.passed if singularity.turned), default=None)
 
     def note_stretch(self, number: int, stretch: Stretch, base: float) -> None:
@@ -162,7 +162,7 @@ class PathPlan:
                 self.nearest_singularity = (self.length + float(s[index]), float(worst[k]), q[index].copy())
 
     def set_motion(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
-        """The same with its motion from a posture on.
+        """This plan with its motion from a posture on.
 
         Args:
             start: (n,) [rad | mm] where the motion begins.

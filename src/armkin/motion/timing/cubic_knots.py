@@ -55,7 +55,7 @@ class Knots:
 
     @staticmethod
     def ends(values: Array, intervals: slice | Int) -> tuple[Array, Array]:
-        """Of values at the points, (N, n), those at both ends of intervals: (n, M) twice."""
+        """Values at both ends of intervals, (n, M) twice, of those at the points (N, n)."""
         columns = values.T
         if isinstance(intervals, slice):
             return columns[:, :-1][:, intervals], columns[:, 1:][:, intervals]

@@ -36,13 +36,13 @@ class Least(NamedTuple):
         return lowest
 
     def part(self, lo: int, hi: int) -> Least:
-        """The same of intervals lo to hi."""
+        """The least functions of intervals lo to hi."""
         first, last = np.searchsorted(self.interval, [lo, hi])
         a0, b0, a1, b1 = (values[lo:hi] for values in (self.a0, self.b0, self.a1, self.b1))
         return Least(a0, b0, a1, b1, self.interval[first:last] - lo, self.slope[first:last], self.level[first:last])
 
     def replace_intervals(self, intervals: Int, functions: Least) -> Least:
-        """The same with other functions in some intervals (k,), ascending."""
+        """The least functions with others in some intervals (k,), ascending; a0 to b1 change in place."""
         for own, values in zip(self[:4], functions[:4], strict=True):
             own[intervals] = values
         fresh = np.zeros(len(self.a0), bool)
@@ -68,7 +68,7 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
 
 
 def concatenate_least(parts: list[Least]) -> Least:
-    """The same of intervals one part after another."""
+    """The least functions of all parts' intervals, one part after another."""
     if len(parts) == 1:
         return parts[0]
     begin = np.cumsum([0, *(len(part.a0) for part in parts)])
@@ -83,7 +83,7 @@ def forward_step(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
 
 
 def backward_step(keep: Array, gain: Array) -> tuple[Array, Array]:
-    """The same from the end of the path: x[i+1] is reached from e x[i+1] + f at most; the last interval is first."""
+    """Rows e and f from the end of the path: x[i+1] is reached from e x[i+1] + f at most; last interval first."""
     e = np.where(keep > 0, 1.0 / keep, 0.0)
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 

@@ -105,7 +105,7 @@ def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
 
 
 def refine_knots(path: Knots) -> Knots:
-    """The same cubics on more grid points, if there are few: u is constant between two of them.
+    """The path's cubics on more grid points, if there are few: u is constant between two of them.
 
     With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
     """

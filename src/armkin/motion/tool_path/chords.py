@@ -28,7 +28,7 @@ class Chords:
 
     @cached_property
     def length(self) -> Array:
-        """Of every chord: (N - 1,)."""
+        """Length of every chord: (N - 1,)."""
         return np.asarray(np.linalg.norm(self.step, axis=1))
 
     @cached_property

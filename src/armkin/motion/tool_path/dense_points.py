@@ -124,7 +124,7 @@ class _Spots:
         return _Spots(task, p, np.concatenate([first.sums[None], sums])[since], turned)
 
     def spot(self, k: int) -> Spot:
-        """One of them."""
+        """The spot of point k."""
         return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
 
     def relative_values(self, a: int, b: int) -> Array | None:

@@ -75,7 +75,7 @@ class Rows:
         )
 
     def part(self, curves: Int) -> Rows:
-        """Those of some curves, all rows of each."""
+        """All rows of some curves."""
         taken = {field.name: getattr(self, field.name).T.take(curves, axis=-1).T for field in fields(self)}
         taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
         return Rows(**taken)

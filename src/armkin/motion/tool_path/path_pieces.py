@@ -94,7 +94,7 @@ class Dense:
     tool_speed: Array  # (c,) [mm/s]; nan: the path's
 
     def part(self, a: float, b: float) -> Dense:
-        """Of the part from length a to b."""
+        """What is known of the part from length a to b [mm]."""
         passed, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
         return replace(
             self,
@@ -344,7 +344,7 @@ def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale:
 
 
 def _table_intervals(spans: int) -> int:
-    """Of the table of lengths, for each of so many spans."""
+    """Number of intervals of the table of lengths for each of so many spans."""
     return int(np.clip(_TABLES // max(spans, 1), _MIN_TABLE, _TABLE))
 
 

@@ -31,7 +31,7 @@ class GuardImage:
     weight: tuple[int, ...] = ()  # a byte each; all 0: the switch guards nothing
 
     def pack(self, axes: int) -> bytes:
-        """Its bytes, for so many axes."""
+        """The switch's bytes in the configuration of a board of so many axes."""
         weight = self.weight or (0,) * axes
         used = any(weight)
         return struct.pack(f"<B{axes}b", used | (used and self.closed) << 1, *weight)

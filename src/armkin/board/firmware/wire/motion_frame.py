@@ -65,6 +65,6 @@ class MotionFrame:
         return sum(s.units() for s in self.segments) * 256 / self.clock
 
     def payload(self, tag: int) -> bytes:
-        """Its frame."""
+        """The payload of this motion's frame."""
         at_rest, brake = self.at_rest, self.brake
         return motion(tag, self.axes, self.start, self.end, self.segments, at_rest=at_rest, brake=brake)

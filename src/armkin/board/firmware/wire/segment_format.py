@@ -32,7 +32,7 @@ class Segment:
     quick: bool = False
 
     def for_axes(self, axes: Sequence[int]) -> Segment:
-        """The same for some of its axes."""
+        """This segment for some of its axes."""
         return replace(self, rates=tuple(self.rates[k] for k in axes))
 
     def interval_after(self, ticks: int) -> int:
@@ -72,7 +72,7 @@ class Segment:
         return tuple((HALF + self.ticks * r) >> 23 for r in self.rates)
 
     def units(self) -> int:
-        """Its length as the queue counts it, in units of 256 cycles."""
+        """The segment's length as the queue counts it, in units of 256 cycles."""
         return (self.ticks * ((self.interval + self.last_interval) // 2)) >> 8
 
 
@@ -94,7 +94,7 @@ def _sent_rate(rate: int) -> int:
 
 
 def _full_rate(short: int) -> int:
-    """And back."""
+    """The rate [2^-23 steps a tick] of a coarse rate as it was sent."""
     return short * COARSE_UNIT if abs(short) != FINE_BOUND - 1 else int(math.copysign(_FULL, short))
 
 
