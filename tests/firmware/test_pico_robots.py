@@ -87,7 +87,7 @@ def test_six_axis_arms_find_their_switches(pytestconfig: pytest.Config, monkeypa
 
 def finds_its_switches(name: str, joints: range, monkeypatch: pytest.MonkeyPatch) -> None:
     # the emulator takes 5 s of a core for a second of six fast axes: the host must not take that for a standstill
-    monkeypatch.setattr("armkin.board.firmware.wire.session._STALLED", 120.0)
+    monkeypatch.setattr("armkin.board.firmware.wire.session._STALL_TIMEOUT", 120.0)
     robot = ROOT / "robots" / f"{name}.yaml"
     arm = armkin.load(robot)
     step = np.radians([switch.direction for switch in arm.homing if switch is not None])

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
 from armkin.board.firmware.wire import protocol
-from armkin.board.firmware.wire.go_back_n import QUESTION
+from armkin.board.firmware.wire.go_back_n import QUESTION_BYTES
 from armkin.board.firmware.wire.motion_frame import MotionFrame, motion_size
 from armkin.board.firmware.wire.protocol import Segment, State, Status
 
@@ -177,7 +177,7 @@ def motion_batches(
     line = session.line
     moving = sorted(move.moving, key=lambda k: axes[k])
     begin_counts = [int(move.start[k]) for k in moving]
-    room = min(session.info.frame - 4, session.info.receive - QUESTION - 6)
+    room = min(session.info.frame - 4, session.info.receive - QUESTION_BYTES - 6)
     places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
     source = (s.for_axes(moving) for s in move.segments)
     segments: list[Segment] = list(islice(source, _SEEN))

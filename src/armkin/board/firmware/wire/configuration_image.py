@@ -6,8 +6,8 @@ import struct
 import zlib
 from dataclasses import dataclass
 
-_LAYOUT = 2  # version of the image's layout
-_AXIS = 21  # size [bytes] of an axis
+_LAYOUT_VERSION = 2  # version of the image's layout
+_AXIS_BYTES = 21  # size [bytes] of an axis
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ class Image:
         n = len(self.axes)
         flags = self.abort_closed | self.enable_high << 1 | self.power_sensed << 2
         times = (self.step_high, self.step_low, self.dir_setup, self.wake)
-        packed = struct.pack("<8BI", _LAYOUT, n, len(self.rows), flags, *times, self.meaning)
+        packed = struct.pack("<8BI", _LAYOUT_VERSION, n, len(self.rows), flags, *times, self.meaning)
         for a in self.axes:
             marks = a.used | a.invert << 1
             packed += struct.pack("<BiiiII", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
@@ -83,12 +83,13 @@ class Image:
             return None
         layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", raw)
         offset = 12
-        if layout != _LAYOUT or flags > 7 or len(raw) != offset + _AXIS * n + (1 + n) * switches + (8 + 2 * n) * rows:
+        size = offset + _AXIS_BYTES * n + (1 + n) * switches + (8 + 2 * n) * rows
+        if layout != _LAYOUT_VERSION or flags > 7 or len(raw) != size:
             return None
         axes = []
         for _ in range(n):
             marks, *fields = struct.unpack_from("<BiiiII", raw, offset)
-            offset += _AXIS
+            offset += _AXIS_BYTES
             if marks > 3:
                 return None
             axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))

@@ -15,13 +15,13 @@ from armkin.board.firmware.wire import protocol, reply_checks
 from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 from armkin.board.firmware.wire.serial_line import Line
 
-_RESEND = 0.03  # time [s] without progress, beyond the time of the slowest answer, after which frames are sent again
-_GAP = 0.004  # time [s] after all that was sent has left and an answer had its time
+_RESEND_TIMEOUT = 0.03  # time [s] without progress, beyond that of the slowest answer, until frames are sent again
+_GAP_TIME = 0.004  # time [s] after all that was sent has left and an answer had its time
 _ASK_AFTER = 0.012  # time [s] without progress before a question is to find out
 _NOISY_RESEND = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 1, 16  # frames under way, on a bad line, where what follows a lost one is for nothing, and on a good one
-_BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
-QUESTION = 12  # size [bytes] of a STATUS? on the line
+_MAX_BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
+QUESTION_BYTES = 12  # size [bytes] of a STATUS? on the line
 
 
 @dataclass
@@ -46,7 +46,7 @@ class Window:
         self._gap = False  # the first of those that were sent is lost for certain
         self._sent_at = 0.0  # time at which any was written last
         self._deaf = 0.0  # until then an answer may be to what was sent before the last going back
-        self._bytes = _BYTES[1]  # bytes that may be under way
+        self._bytes = _MAX_BYTES[1]  # bytes that may be under way
 
     def begin(self, info: Info) -> None:
         """Start with a new session: nothing is under way, the queue is empty."""
@@ -86,20 +86,20 @@ class Window:
         """Send new frames as far as credit and window allow, and all of them again when nothing has come for long."""
         begun = self._line.port.now()
         self._fill()
-        beyond_slowest = _GAP if self._gap else _RESEND
+        beyond_slowest = _GAP_TIME if self._gap else _RESEND_TIMEOUT
         patience = _NOISY_RESEND if self._line.noisy else self._line.slowest + beyond_slowest
         if self._sent and begun - self._line.clear > patience:
             self._go_back(0, len(self._sent[0][1]))
         elif self._gap and not self._line.noisy and begun > self._deaf:
             # what told of it was the answer to the second or a later one: the oldest without one is the third
             behind = sum(len(frame_bytes) for _, frame_bytes in islice(self._sent, 3, None))
-            if behind + len(self._sent[0][1]) <= self._receive - QUESTION:
+            if behind + len(self._sent[0][1]) <= self._receive - QUESTION_BYTES:
                 self._go_back(behind, 0)
 
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        patience = self._line.slowest + (_GAP if self._line.damaged else _ASK_AFTER)
+        patience = self._line.slowest + (_GAP_TIME if self._line.damaged else _ASK_AFTER)
         return bool(self._sent) and self._line.port.now() - self._line.clear > patience
 
     def _room(self, size: int, first: int) -> int:
@@ -107,7 +107,7 @@ class Window:
 
         What follows the frame that the board is busy with must fit into its receive buffer, a STATUS? included.
         """
-        return min(self._bytes, first + self._receive - QUESTION) - size
+        return min(self._bytes, first + self._receive - QUESTION_BYTES) - size
 
     @property
     def credit(self) -> int:
@@ -142,9 +142,9 @@ class Window:
         size: bytes under way behind the oldest frame without an answer, first: of it what need not fit the ring.
         """
         self._gap = False
-        self._bytes = _BYTES[0] if self._line.noisy else max(_BYTES[0], self._bytes // 2)
+        self._bytes = _MAX_BYTES[0] if self._line.noisy else max(_MAX_BYTES[0], self._bytes // 2)
         self._sent_at = self._line.port.now()
-        self._deaf = max(self._sent_at, self._line.clear) + self._line.slowest + _GAP
+        self._deaf = max(self._sent_at, self._line.clear) + self._line.slowest + _GAP_TIME
         self._line.write(b"\0")
         for k, (_, frame_bytes) in enumerate(self._sent):
             room = self._room(size, first)
@@ -167,7 +167,7 @@ class Window:
         self._next, self._free = reply.next, reply.free
         if count:
             self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
-            self._bytes = _BYTES[0] if self._line.noisy else min(_BYTES[1], self._bytes + 20)
+            self._bytes = _MAX_BYTES[0] if self._line.noisy else min(_MAX_BYTES[1], self._bytes + 20)
         elif self._sent and (
             type(reply) is Ack or requested > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):

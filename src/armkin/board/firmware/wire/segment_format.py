@@ -11,7 +11,7 @@ STEP = 1 << 23  # units of a rate and of a place in one step
 HALF = STEP // 2  # place of an axis at rest, above its count
 COARSE_UNIT = 1 << 8  # unit of rates from 2^-8 step a tick on, in units of a rate
 FINE_BOUND = 1 << 15  # bound of smaller rates, which are sent in units of 1
-_FULL = STEP - 128  # greatest rate: a step a tick, but for 2^-16
+_MAX_RATE = STEP - 128  # greatest rate: a step a tick, but for 2^-16
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
 
@@ -63,7 +63,7 @@ class Segment:
     @property
     def narrow(self) -> bool:
         """True if it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
-        coarse = all(r % COARSE_UNIT == 0 or abs(r) == _FULL for r in self.rates)
+        coarse = all(r % COARSE_UNIT == 0 or abs(r) == _MAX_RATE for r in self.rates)
         return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
 
     @property
@@ -85,7 +85,7 @@ def nearest_rate(exact: float) -> int:
 
 def _coarse_rate(exact: float) -> int:
     rate = round(exact / COARSE_UNIT)
-    return rate * COARSE_UNIT if abs(rate) < FINE_BOUND - 1 else int(math.copysign(_FULL, rate))
+    return rate * COARSE_UNIT if abs(rate) < FINE_BOUND - 1 else int(math.copysign(_MAX_RATE, rate))
 
 
 def _sent_rate(rate: int) -> int:
@@ -95,7 +95,7 @@ def _sent_rate(rate: int) -> int:
 
 def _full_rate(short: int) -> int:
     """The rate [2^-23 steps a tick] of a coarse rate as it was sent."""
-    return short * COARSE_UNIT if abs(short) != FINE_BOUND - 1 else int(math.copysign(_FULL, short))
+    return short * COARSE_UNIT if abs(short) != FINE_BOUND - 1 else int(math.copysign(_MAX_RATE, short))
 
 
 def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:

@@ -10,8 +10,8 @@ from armkin.board.ports import Port
 
 _COPIES = 3  # copies of every frame on a bad line, and of questions that nothing goes on without
 _ANSWER_TIME = 0.03  # time [s] that an answer may take
-_ASKING = 50  # size [bytes] of a STATUS? and its answer, at least
-_PATIENCE, _SPARE_TIME = 0.05, 0.012  # time [s] for an answer; time [s] beyond twice the slowest of those measured
+_MIN_QUESTION_BYTES = 50  # size [bytes] of a STATUS? and its answer, at least
+_ANSWER_TIMEOUT, _SPARE_TIME = 0.05, 0.012  # times [s] for an answer, and beyond twice the slowest of those measured
 
 
 class Line:
@@ -73,7 +73,7 @@ class Line:
     @property
     def patience(self) -> float:
         """Seconds in which an answer to a STATUS? is here, if nothing was lost."""
-        return min(_PATIENCE, 2 * self.slowest + _SPARE_TIME) if self.slowest else _PATIENCE
+        return min(_ANSWER_TIMEOUT, 2 * self.slowest + _SPARE_TIME) if self.slowest else _ANSWER_TIMEOUT
 
     def take_answer(self, tag: int) -> float:
         """When it was asked; waits as long as it was late: so long the line is behind what was written already."""
@@ -82,7 +82,7 @@ class Line:
             return 0.0
         self._asked_at = {t: time for t, time in self._asked_at.items() if time > time_asked}
         took = self.port.now() - time_asked
-        self.slowest = max(self.slowest, took - _ASKING * 10 / self.port.baud)
+        self.slowest = max(self.slowest, took - _MIN_QUESTION_BYTES * 10 / self.port.baud)
         if took > _ANSWER_TIME:
             self.clear = max(self.clear, self.port.now() + took - _ANSWER_TIME)
         return time_asked

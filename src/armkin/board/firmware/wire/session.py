@@ -15,22 +15,22 @@ from armkin.board.firmware.wire.serial_line import Line
 from armkin.board.ports import Port, leave_boot_loader
 from armkin.errors import LinkError
 
-_POLL = 0.1  # time [s] between two STATUS?: the board holds after 0.5 s of silence
-_POLL_NOISY = 0.025  # time [s] between two STATUS? on a bad line, which loses some of them
-_POLL_SOON = 0.01  # time [s] between two STATUS? while waiting for credit, which only answers bring, or for the end
-_ENDS = 50  # motion [ms] that the queue holds when its end is near
-_GIVE_UP = 1.5  # time [s] without any answer after which a board counts as gone
+_POLL_PERIOD = 0.1  # time [s] between two STATUS?: the board holds after 0.5 s of silence
+_NOISY_POLL_PERIOD = 0.025  # time [s] between two STATUS? on a bad line, which loses some of them
+_QUICK_POLL_PERIOD = 0.01  # time [s] between two while waiting for credit, which only answers bring, or for the end
+_END_MILLISECONDS = 50  # motion [ms] that the queue holds when its end is near
+_SILENCE_TIMEOUT = 1.5  # time [s] without any answer after which a board counts as gone
 _MAX_TURN_WAIT = 0.1  # time [s] that one turn counts at most: a program that waited longer for its own was deaf
-_QUIET = 3.0  # time [s] of questions without an answer, of a board that was there
-_UNANSWERED = 16  # questions without an answer
-_STALLED = 5.0  # time [s] beyond what all in the queue may take
-_HOLD = 15.0  # time [s] that an arm may take to come to rest
-_LISTENS = 0.2  # time [s] after the opening by which a Mega's boot loader listens
-_TRIES = 0.5  # time [s] in which a board that nothing has reset, or a Mega, answers
-_AGAIN = 1.8  # time [s] after the opening by which every boot loader that nobody spoke to has left
-_BOOT = 5.0  # time [s] that a board may take to answer after its port was opened
-_KEPT = 1000  # bytes of what is no board's that are kept
-_PROBES = 8  # questions that a line is judged by
+_STATUS_TIMEOUT = 3.0  # time [s] of questions without an answer, of a board that was there
+_MAX_UNANSWERED = 16  # questions without an answer
+_STALL_TIMEOUT = 5.0  # time [s] beyond what all in the queue may take
+_HOLD_TIMEOUT = 15.0  # time [s] that an arm may take to come to rest
+_LISTEN_DELAY = 0.2  # time [s] after the opening by which a Mega's boot loader listens
+_GREETING_TIME = 0.5  # time [s] in which a board that nothing has reset, or a Mega, answers
+_BOOT_LOADER_TIME = 1.8  # time [s] after the opening by which every boot loader that nobody spoke to has left
+_BOOT_TIMEOUT = 5.0  # time [s] that a board may take to answer after its port was opened
+_MAX_JUNK_BYTES = 1000  # bytes of what is no board's that are kept
+_PROBE_COUNT = 8  # questions that a line is judged by
 
 
 class Session:
@@ -63,7 +63,7 @@ class Session:
         Raises LinkError if nothing answers, or something else than this protocol.
         """
         begin, nonce = self.port.now(), _new_nonce()
-        heard, leave = bytearray(), [_LISTENS, _AGAIN]
+        heard, leave = bytearray(), [_LISTEN_DELAY, _BOOT_LOADER_TIME]
         while True:
             since = self.port.now() - begin
             # A few tries; then silence, for a boot loader that listens; then on to the end.
@@ -71,16 +71,16 @@ class Session:
                 leave_boot_loader(self.port)
                 del leave[0]
                 nonce = _new_nonce()  # a new session: a board counts those words as damaged frames
-            if since < _TRIES or since > _AGAIN:
+            if since < _GREETING_TIME or since > _BOOT_LOADER_TIME:
                 late_patience = 0.15 if since < 3.0 else 0.4
-                info = self._greet(nonce, 0.06 if since < _TRIES else late_patience)
+                info = self._greet(nonce, 0.06 if since < _GREETING_TIME else late_patience)
                 if info is not None:
                     return info
             else:
-                heard += self.port.read(0.05)[: _KEPT - len(heard)]
+                heard += self.port.read(0.05)[: _MAX_JUNK_BYTES - len(heard)]
             if self._stop():
                 raise StoppedError
-            if since > _BOOT:
+            if since > _BOOT_TIMEOUT:
                 raise _no_board(self.port, bytes(heard), self.line.splitter.bad > 0)
 
     def reopen(self) -> Info:
@@ -120,7 +120,7 @@ class Session:
 
     def _renew_patience(self) -> None:
         """Something went on: wait for the next as long as what is queued may take, and a little."""
-        self._until = self.port.now() + self.queued / 1000 + _STALLED
+        self._until = self.port.now() + self.queued / 1000 + _STALL_TIMEOUT
 
     def _check_stalled(self) -> None:
         """Raise LinkError if the board has neither gone on nor come to rest in all the time that it may take."""
@@ -186,7 +186,7 @@ class Session:
         self._silent_for += min(self.port.now() - present, _MAX_TURN_WAIT)
         if self.heard >= present:
             self._silent_for = 0.0
-        elif self._silent_for > _GIVE_UP:
+        elif self._silent_for > _SILENCE_TIMEOUT:
             raise _silence_error(self.port)
         if self._window:
             self._check_stalled()
@@ -228,7 +228,7 @@ class Session:
         """Where the board stands, now; also after the session has ended."""
         tags: list[int] = []  # asked since this was called: an answer may come later than the next question
         begin = self.port.now()
-        while self.port.now() - begin < _QUIET:
+        while self.port.now() - begin < _STATUS_TIMEOUT:
             tags.append(self._ask(page, self.line.copies))  # each is answered: one of them will come through
             end = self.port.now() + self.line.patience
             while self.port.now() < end:
@@ -250,13 +250,13 @@ class Session:
             status = self.status()
             if status.state == State.IDLE and status.error:
                 return status
-            if self.port.now() - begin > _HOLD:
+            if self.port.now() - begin > _HOLD_TIMEOUT:
                 raise LinkError(f"the board on {self.port.name} does not come to rest: cut the motors' power")
             self._hear(0.03)
 
     def wait_for_rest(self) -> Status:
         """Wait until the arm stands, whatever the session is; its status then."""
-        self._until = self.port.now() + _HOLD
+        self._until = self.port.now() + _HOLD_TIMEOUT
         while True:
             status = self.status()
             if status.state == State.IDLE:
@@ -264,37 +264,37 @@ class Session:
             if self._stop():
                 raise StoppedError(self.hold())
             self._check_stalled()
-            self._hear(_POLL_SOON)
+            self._hear(_QUICK_POLL_PERIOD)
 
     def arrivals(self, seconds: float = 0.0) -> Iterator[float]:
         """Wait until all that was submitted is done and the arm stands; yields the seconds left.
 
         seconds: that a motion may take which is not queued: homing.
         """
-        self._until = max(self._until, self.port.now() + self.queued / 1000 + seconds + _STALLED)
+        self._until = max(self._until, self.port.now() + self.queued / 1000 + seconds + _STALL_TIMEOUT)
         while True:
             self._check_stalled()
             if not self._window and self.state == State.IDLE:
                 return
             left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
-            self.pump(ends=not self._window and left < _ENDS)
+            self.pump(ends=not self._window and left < _END_MILLISECONDS)
             yield self.under_way + self.queued / 1000
 
 
 def _between_questions(line: Line, window: Window, ends: bool) -> float:
     """Seconds from one question for the status to the next; ends: the queue does."""
-    if line.unanswered > _UNANSWERED:  # more questions would fill the line, and be lost in front of the board
-        return _POLL
+    if line.unanswered > _MAX_UNANSWERED:  # more questions would fill the line, and be lost in front of the board
+        return _POLL_PERIOD
     # There is room for one question beside the frames; on a bad line the one before may be lost.
     late = window.late and (line.damaged or not line.unanswered)
-    often = _POLL_NOISY if line.damaged else _POLL
-    quick = _POLL_SOON if ends or window.out_of_credit or late else often
+    often = _NOISY_POLL_PERIOD if line.damaged else _POLL_PERIOD
+    quick = _QUICK_POLL_PERIOD if ends or window.out_of_credit or late else often
     return quick / 2 if line.noisy else quick
 
 
 def probe_line(session: Session) -> None:
     """Ask a few questions, to learn whether the line is good before anything depends on it."""
-    for _ in range(_PROBES):
+    for _ in range(_PROBE_COUNT):
         if session.status().bad:
             session.line.resent += 1
 
