@@ -9,7 +9,7 @@ from three_servos import ARM, HOME, connect_servos, servo_bus
 import armkin
 from armkin.board.backend import StoppedError
 from armkin.board.feetech import registers
-from armkin.board.feetech.feetech_machine import LAG, SETTLED, ServoMachine
+from armkin.board.feetech.feetech_machine import MAX_LAG, SETTLED_DISTANCE, ServoMachine
 from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError, NoSolutionError
 
@@ -29,7 +29,7 @@ def test_random_moves_arrive_and_stay_near_their_line(noise: Noise | None) -> No
         port.log.clear()
         plan = machine.plan(machine.counts(), goal)
         machine.run([plan])
-        assert np.abs(np.array(machine.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED
+        assert np.abs(np.array(machine.counts()) - armkin.pulses(ARM, goal)).max() <= SETTLED_DISTANCE
         places = np.array([[position_of[k] for k in (1, 2, 3)] for _, position_of in port.log])
         way = plan.end - start
         share = ((places - start) @ way) / (way @ way)
@@ -68,7 +68,7 @@ def test_a_blocked_servo_holds_the_arm() -> None:
     with pytest.raises(LinkError, match=r"servo 2 \(j2\) is \d+ counts behind: blocked or overloaded"):
         machine.run([machine.plan(machine.counts(), np.deg2rad([0, 120, 0]))])
     assert abs(port.servos[2].position - HOME[1]) < 1
-    assert LAG < 1024
+    assert MAX_LAG < 1024
 
 
 def test_a_servos_errors_are_told() -> None:
@@ -167,4 +167,4 @@ def test_a_goal_outside_a_servo_s_own_limits_is_refused_before_anything_moves() 
     with pytest.raises(NoSolutionError, match="outside its own limits 1500 to 2000"):
         two.run([two.plan(two.counts(), np.deg2rad([10, -21, 10]))])
     two.run([two.plan(two.counts(), np.deg2rad([10, 20, 10]))])
-    assert np.abs(np.array(two.counts()) - armkin.pulses(ARM, np.deg2rad([10, 20, 10]))).max() <= SETTLED
+    assert np.abs(np.array(two.counts()) - armkin.pulses(ARM, np.deg2rad([10, 20, 10]))).max() <= SETTLED_DISTANCE

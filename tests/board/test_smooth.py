@@ -11,7 +11,7 @@ from armkin.board.firmware.segments.trajectory_to_counts import plan_moves as pl
 from armkin.board.firmware.wire.protocol import BLOCK, HALF, STEP, Segment
 from armkin.model import build_arm as arms
 
-CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, 448
+CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK_RATE, 448
 
 
 def ticks(cut: list[Segment]) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

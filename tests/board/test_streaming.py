@@ -158,7 +158,7 @@ def test_a_grip_goes_on_behind_a_stall(frame: int) -> None:
 def test_a_grip_is_held_after_a_second_and_behind_its_beginning(
     monkeypatch: pytest.MonkeyPatch, frame: int, seconds: float, beginning: float
 ) -> None:
-    monkeypatch.setattr(carry_out_plans, "_BEGINNING", beginning)
+    monkeypatch.setattr(carry_out_plans, "_BEGINNING_TIME", beginning)
     grip = gripping.gripper_of(ARM.name, configure(ARM))
     machine = machine_on(Stalling(SimBoard(BOARDS["uno_cnc_shield"]), frame, seconds))
     gripping.prepare_gripper(machine, grip, None)

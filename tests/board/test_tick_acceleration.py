@@ -46,7 +46,8 @@ def test_a_bend_counts_in_the_last_interval_as_often_as_the_device_adds_it_up(qu
 def unheard_cycles(cut: list[Segment]) -> float:
     """Cycles by which a line is ahead of its law, as nobody can tell before its first step."""
     first = cut[0]
-    return 0.0 if first.add or any(first.steps) else first.ticks * first.interval * (1 / straight_lines.UNHEARD - 1)
+    is_heard = first.add or any(first.steps)
+    return 0.0 if is_heard else first.ticks * first.interval * (1 / straight_lines.UNHEARD_SHARE - 1)
 
 
 def leaders_limits(cut: list[Segment], law: Profile, steps: int, axis: int, clock: int) -> tuple[float, float, float]:

@@ -25,7 +25,7 @@ from armkin.motion.timing import profile
 from armkin.motors import joints, pulses
 from least_time import least_seconds
 
-CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK, counts_to_segments.MIN_INTERVAL
+CLOCK, MIN_INTERVAL = counts_to_segments.CLOCK_RATE, counts_to_segments.MIN_INTERVAL
 counts = st.integers(-40_000, 40_000)
 RAMPS = st.floats(0.03, 3.0)  # [s] to full speed
 
@@ -64,7 +64,7 @@ def unheard_seconds(segments: Iterable[Segment]) -> float:
     """Seconds by which a line is ahead of its law, as nobody can tell before its first step."""
     first = next(iter(segments))
     is_heard = first.add or any(first.steps)
-    return 0.0 if is_heard else counts_to_segments.cycles_of(first) / CLOCK * (1 / straight_lines.UNHEARD - 1)
+    return 0.0 if is_heard else counts_to_segments.cycles_of(first) / CLOCK * (1 / straight_lines.UNHEARD_SHARE - 1)
 
 
 def trapezoid_distance(t: np.ndarray, length: float, top: float, accel: float) -> np.ndarray:

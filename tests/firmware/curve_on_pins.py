@@ -15,7 +15,7 @@ from emulator import EmulatedBoard, Trace
 
 import armkin
 from armkin.board.firmware.configuration import configure
-from armkin.board.firmware.segments.counts_to_segments import CLOCK
+from armkin.board.firmware.segments.counts_to_segments import CLOCK_RATE
 from armkin.board.firmware.segments.straight_lines import straight_line
 from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.board.firmware.wire import protocol
@@ -142,7 +142,7 @@ def late_us(trace: Trace, expected: Sequence[Array]) -> float:
     if [len(x) for x in measured] != [len(x) for x in expected]:
         return float(np.inf)
     apart = np.concatenate([a - b for a, b in zip(measured, expected, strict=True)])
-    return float(np.ptp(apart)) / 2 / CLOCK * 1e6  # the motion's begin is that which makes it least
+    return float(np.ptp(apart)) / 2 / CLOCK_RATE * 1e6  # the motion's begin is that which makes it least
 
 
 def counts_of(trace: Trace, start: Sequence[int]) -> tuple[Array, Array]:
@@ -185,7 +185,7 @@ def hold_curve(laid: Laid, share: float, *, cable: bool = False) -> Held:
         cycle, counts = counts_of(trace, laid.start)
         rest_counts = np.array(status.counts[:3])
         if cable:  # the board notices 500 ms after the last byte
-            begin = int(trace.edges("uart.in")[0][trace.edges("uart.in")[0] <= begin][-1]) + CLOCK // 2
+            begin = int(trace.edges("uart.in")[0][trace.edges("uart.in")[0] <= begin][-1]) + CLOCK_RATE // 2
         is_known = bool((rest_counts == counts[-1]).all()) and (status.known & 0b111) == 0b111
         accel = _greatest_acceleration(laid.arm, trace, laid.start, begin)
         host.hello(77)
@@ -198,7 +198,7 @@ def hold_curve(laid: Laid, share: float, *, cable: bool = False) -> Held:
             float(laid.off(counts[::7]).max()),
             accel,
             list(after.counts[:3]) == goal and after.error == 0,
-            float(cycle[-1] - begin) / CLOCK * 1e3,
+            float(cycle[-1] - begin) / CLOCK_RATE * 1e3,
         )
 
 
@@ -244,10 +244,10 @@ def _greatest_acceleration(arm: armkin.Arm, trace: Trace, start: Sequence[int], 
     for k, name in enumerate("XYZ"):
         cycle, direction = trace.steps(name)
         place = start[k] + np.cumsum(direction) - np.where(direction > 0, 0, -1)
-        t = cycle / CLOCK
+        t = cycle / CLOCK_RATE
         joint = int(np.abs(gain[k]).argmax())
         last = t[-1]
-        for a in np.arange(begin / CLOCK, last - WINDOW, WINDOW / 20):
+        for a in np.arange(begin / CLOCK_RATE, last - WINDOW, WINDOW / 20):
             inside = (t >= a) & (t <= a + WINDOW)
             if inside.sum() < 12:
                 continue

@@ -16,7 +16,7 @@ from curve_on_pins import counts_of, late_us, predicted_steps
 from emulator import EmulatedBoard
 
 import armkin
-from armkin.board.firmware.segments.counts_to_segments import CLOCK
+from armkin.board.firmware.segments.counts_to_segments import CLOCK_RATE
 from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.kinds import board_of
 from armkin.board.planner import Planner
@@ -77,10 +77,10 @@ def stream_waypoints(count: int, *, blend: float = BLEND, patience: float = 0.0)
         trace, axes = board.trace(), board.stats()["axes"]
     cycle, counts = counts_of(trace, [0, 0, 0])
     ends = [counts[-1].tolist(), [axes[name]["net"] for name in "XYZ"], said["pulses"]]
-    at = np.arange(cycle[0] + RAMP * CLOCK, cycle[-1] - RAMP * CLOCK, WINDOW / 5 * CLOCK)
+    at = np.arange(cycle[0] + RAMP * CLOCK_RATE, cycle[-1] - RAMP * CLOCK_RATE, WINDOW / 5 * CLOCK_RATE)
     there, here = (
         np.rad2deg(armkin.joints(arm, counts[np.searchsorted(cycle, at + half)]))
-        for half in (WINDOW / 2 * CLOCK, -WINDOW / 2 * CLOCK)
+        for half in (WINDOW / 2 * CLOCK_RATE, -WINDOW / 2 * CLOCK_RATE)
     )
     apart = np.linalg.norm(np.diff(q, axis=0), axis=1)
     return Streamed(
@@ -90,10 +90,10 @@ def stream_waypoints(count: int, *, blend: float = BLEND, patience: float = 0.0)
         all(end == plan.end.tolist() for end in ends),
         sum(sum(axes[name]["violations"].values()) for name in "XYZ"),
         late_us(trace, wanted),
-        float(np.diff(cycle).max()) / CLOCK * 1e3,
-        float(np.diff(np.sort(np.concatenate(wanted))).max()) / CLOCK * 1e3,
+        float(np.diff(cycle).max()) / CLOCK_RATE * 1e3,
+        float(np.diff(np.sort(np.concatenate(wanted))).max()) / CLOCK_RATE * 1e3,
         float(np.linalg.norm(there - here, axis=1).min()) / WINDOW,
-        float(cycle[-1] - cycle[0]) / CLOCK,
+        float(cycle[-1] - cycle[0]) / CLOCK_RATE,
         len(segments) / plan.duration,
         after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
     )

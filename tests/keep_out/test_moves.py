@@ -65,7 +65,7 @@ def test_a_jog_ends_so_early_that_it_stands_at_the_hit(table: str, monkeypatch: 
     )
     rates = jogging.count_rates(machine, 0, 30.0)  # deg/s
     rate = float((np.linalg.pinv(arm.motor_gain) @ np.array([rates[axis] for axis in axes]))[0])
-    seconds = jogging.free_seconds(machine, 0, rates) + jogging.HANDLE
+    seconds = jogging.free_seconds(machine, 0, rates) + jogging.HANDLE_TIME
     assert seconds * rate + rate**2 / (2 * float(arm.max_accel[0])) == pytest.approx(way[0])
 
 

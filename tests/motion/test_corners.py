@@ -71,7 +71,7 @@ def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, mon
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
-    monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._SAMPLES", 700)
+    monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._CHUNK_SAMPLES", 700)
     parts = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )

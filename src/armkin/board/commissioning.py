@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-SHARE = 0.1  # share of a joint's max_speed for all that moves here
-STEP = 2.0  # way [deg | mm] that a joint may leave its place while its direction is looked at
-_FIRST = 5.0  # way [deg | mm] that each joint leaves home in the first move
+SPEED_SHARE = 0.1  # share of a joint's max_speed for all that moves here
+DIRECTION_STEP = 2.0  # way [deg | mm] that a joint may leave its place while its direction is looked at
+_FIRST_DISTANCE = 5.0  # way [deg | mm] that each joint leaves home in the first move
 _MAX_JOG = 60.0  # length [s], at most, of one jog
-_VISIBLE = 1.0  # way [mm] that the tool must move to tell a direction by it
+_VISIBLE_DISTANCE = 1.0  # way [mm] that the tool must move to tell a direction by it
 
 
 class Operator(Protocol):
@@ -121,13 +121,13 @@ def first_move(board: Board, person: Operator) -> bool:
     arm, machine = board.arm, board.machine
     machine.prepare()
     up, down = arm.upper - arm.home, arm.home - arm.lower
-    excursion = np.minimum(units.joints_in(arm, [_FIRST] * arm.n), 0.5 * np.maximum(up, down))
+    excursion = np.minimum(units.joints_in(arm, [_FIRST_DISTANCE] * arm.n), 0.5 * np.maximum(up, down))
     goals = np.array([arm.home + np.where(up >= down, excursion, -excursion), arm.home])
     try:
-        made = board.plan(machine.counts(), goals, SHARE)
+        made = board.plan(machine.counts(), goals, SPEED_SHARE)
     except NoSolutionError as error:
         person.say(f"The way out of home is not free ({error.message.splitlines()[0]}): the arm moves home only.")
-        made = board.plan(machine.counts(), arm.home[None], SHARE)
+        made = board.plan(machine.counts(), arm.home[None], SPEED_SHARE)
     question = f"First move: {made.duration:.1f} s out and back home by itself, Ctrl-C stops it. y: go; s: skip"
     if person.ask(question, "ys") == "s":
         return False
@@ -182,7 +182,7 @@ def _narrow_limit(
 def _able_to_jog(board: Board, person: Operator) -> None:
     """Have a board whose kind moves nothing while the position is lost take the arm to stand at home."""
     try:
-        board.ready_to_jog(0, float(SHARE * board.arm.max_speed[0]))
+        board.ready_to_jog(0, float(SPEED_SHARE * board.arm.max_speed[0]))
     except PositionLostError:
         _until_enter(
             person,
@@ -201,24 +201,25 @@ def _until_enter(person: Operator, text: str) -> None:
 
 
 def _nudge_joint(board: Board, person: Operator, j: int, place: float) -> None:
-    """Move joint j by keys within STEP of its place [rad | mm], to which each way back leads first; Enter ends."""
+    """Move joint j by keys within DIRECTION_STEP of its place [rad | mm]; each way back stops there; Enter ends."""
     arm, machine = board.arm, board.machine
-    step = float(units.joints_in(arm, [STEP] * arm.n)[j])
+    step = float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[j])
     while (key := person.key()) != "\n":
         if key not in "+-" or (more := person.held(key)) is None:
             continue
         sign = 1 if key == "+" else -1
         away = sign * (float(machine.joints()[j]) - place)
-        seconds = (step - away if away > -0.1 * step else -away) / (SHARE * float(arm.max_speed[j]))
+        seconds = (step - away if away > -0.1 * step else -away) / (SPEED_SHARE * float(arm.max_speed[j]))
         if seconds > 0.01:
             _jog_joint(board, person, j, sign, seconds, more)
         else:
-            person.say(f"{arm.joint_names[j]} has moved by {STEP:g}: {'-+'[sign < 0]} takes it back, Enter goes on.")
+            back = "-+"[sign < 0]
+            person.say(f"{arm.joint_names[j]} has moved by {DIRECTION_STEP:g}: {back} takes it back, Enter goes on.")
 
 
 def _jog_joint(board: Board, person: Operator, j: int, sign: int, seconds: float, goes_on: Callable[[], bool]) -> None:
     """Jog a joint at a tenth of its speed; what stops it is told."""
-    rate = sign * SHARE * float(board.arm.max_speed[j])
+    rate = sign * SPEED_SHARE * float(board.arm.max_speed[j])
     try:
         board.jog(j, board.ready_to_jog(j, rate), seconds, goes_on)
     except NoSolutionError as error:
@@ -240,9 +241,9 @@ def _position_in_words(board: Board) -> str:
 
 def _expected_motion(arm: Arm, q: Array, j: int) -> str:
     """What 2 degrees (mm) of a joint do, in the base's frame: ``the tool goes 6.9 mm towards +y``."""
-    J = jacobian(arm, q)[:, j] * float(units.joints_in(arm, [STEP] * arm.n)[j])
+    J = jacobian(arm, q)[:, j] * float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[j])
     shift = J[:3]
-    if float(np.linalg.norm(shift)) >= _VISIBLE:
+    if float(np.linalg.norm(shift)) >= _VISIBLE_DISTANCE:
         return f"the tool goes {float(np.linalg.norm(shift)):.1f} mm, mostly towards {_main_direction(shift)}"
     axis = fk(arm, q)[:3, :3].T @ J[3:]
     about = _main_direction(J[3:])

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_AHEAD = 1000  # rows that are read before they are planned
+_ROWS_AHEAD = 1000  # rows that are read before they are planned
 
 
 class Planner:
@@ -115,7 +115,7 @@ class Stream:
     def __init__(self, arm: Arm, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
         """rows: number and joint values [deg | mm]; what is wrong with one is an ArmkinError."""
         self.problem: ArmkinError | None = None
-        self._rows: queue.Queue[tuple[int, Sequence[float]] | Exception | None] = queue.Queue(_AHEAD)
+        self._rows: queue.Queue[tuple[int, Sequence[float]] | Exception | None] = queue.Queue(_ROWS_AHEAD)
         self._arm = arm
         threading.Thread(target=self._read_rows, args=(rows,), daemon=True).start()
 

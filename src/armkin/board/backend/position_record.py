@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 Marks = Mapping[str, Sequence[float] | str]  # what a board keeps, by name, as it says it
 _MAX_BYTES = 64_000_000  # size [bytes], at most, of a record, and of its plan
-_STEP = 1.0 + 1e-9  # distance [counts] from a plan within which every motor on it is; no count lies just there
+_PLAN_DISTANCE = 1.0 + 1e-9  # distance [counts] from a plan within which every motor on it is; no count lies just there
 
 
 @dataclass(frozen=True)
@@ -118,11 +118,11 @@ def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
     (True, False)
     """
     if len(points) == 1:
-        return bool(np.abs(counts - points[0]).max(initial=0) <= _STEP)
+        return bool(np.abs(counts - points[0]).max(initial=0) <= _PLAN_DISTANCE)
     line, offset = np.diff(points, axis=0), counts - points[:-1]
     with np.errstate(divide="ignore"):
         # Shares of the line at which a motor is near.
-        ends = np.stack([(offset - _STEP) / line, (offset + _STEP) / line])
+        ends = np.stack([(offset - _PLAN_DISTANCE) / line, (offset + _PLAN_DISTANCE) / line])
     first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
     return bool((first <= last).any())
 

@@ -28,18 +28,18 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-PERIOD = 0.02  # time [s] between two positions sent
+SEND_PERIOD = 0.02  # time [s] between two positions sent
 MAX_OVERRUN = 0.05  # time [s] that one position goes on at most: a program that was late does not cut across its path
-WATCH = 0.1  # time [s] between readings of position and errors in motion
-LAG = 400  # distance [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
-SETTLED = 12  # distance [counts] from the goal, 1 degree, at which a move has arrived
-STRAY = 2 * SETTLED  # distance [counts] of a motion's start from where the servos stand: they sag a little under load
-SETTLING = 1.0  # time [s] that a move may take to arrive after its end
+WATCH_PERIOD = 0.1  # time [s] between readings of position and errors in motion
+MAX_LAG = 400  # distance [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
+SETTLED_DISTANCE = 12  # distance [counts] from the goal, 1 degree, at which a move has arrived
+START_DISTANCE = 2 * SETTLED_DISTANCE  # distance [counts] of a start from where the servos stand: they sag under load
+SETTLING_TIME = 1.0  # time [s] that a move may take to arrive after its end
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
     """A trajectory from counts `start` (motors,) on, as positions."""
-    return Job(trajectory, start, int(np.ceil(trajectory.duration / PERIOD)))
+    return Job(trajectory, start, int(np.ceil(trajectory.duration / SEND_PERIOD)))
 
 
 def servo_ids(arm: Arm) -> list[int]:
@@ -170,10 +170,10 @@ class ServoArm(Backend):
         total = elapsed = 0.0
         for ahead_job in filter(None, plans if isinstance(plans, list) else ()):
             self._check_limits(ahead_job)  # all of them, before anything moves
-        for job in from_counts(plans, self._measured, tolerance=STRAY):
+        for job in from_counts(plans, self._measured, tolerance=START_DISTANCE):
             if job is None:
                 self._heed()
-                self.port.read(PERIOD)
+                self.port.read(SEND_PERIOD)
                 continue
             self._check_limits(job)
             total += job.duration
@@ -192,7 +192,7 @@ class ServoArm(Backend):
         """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out where it stands so."""
         low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
         for stretch in job.trajectory.stretches:
-            count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PERIOD)), 1)
+            count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / SEND_PERIOD)), 1)
             goals = pulses(self.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
             for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
                 least, most = self._limits[k].tolist()
@@ -205,21 +205,21 @@ class ServoArm(Backend):
         """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
         last = watched = self.port.now()
         t, pace, stopping = 0.0, 1.0, False
-        ramp = max(braking_time(trajectory), PERIOD)
+        ramp = max(braking_time(trajectory), SEND_PERIOD)
         while t < trajectory.duration and pace > 0.0:
             present = self.port.now()
-            if present - last < PERIOD - 1e-4:
-                self.port.read(PERIOD - (present - last))
+            if present - last < SEND_PERIOD - 1e-4:
+                self.port.read(SEND_PERIOD - (present - last))
                 continue
             stopping = stopping or self._stop()
             passed, last = min(present - last, MAX_OVERRUN), present
             if stopping:
                 pace = max(0.0, pace - passed / ramp)
             t = min(trajectory.duration, t + passed * pace)
-            ahead = min(trajectory.duration, t + PERIOD * pace)
+            ahead = min(trajectory.duration, t + SEND_PERIOD * pace)
             self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
             report(t)
-            if present - watched > WATCH:
+            if present - watched > WATCH_PERIOD:
                 watched = present
                 self._watch(pulses(self.arm, trajectory.q(t)))
         if stopping:
@@ -228,14 +228,14 @@ class ServoArm(Backend):
 
     def _arrive(self, end: NDArray[np.int64]) -> None:
         """Wait until all servos are where the move ends, sending the goal again."""
-        limit = self.port.now() + SETTLING
+        limit = self.port.now() + SETTLING_TIME
         while True:
             self._send(end, np.zeros(len(self.ids)))
-            self.port.read(PERIOD)
+            self.port.read(SEND_PERIOD)
             self._read()
             self._check()
             distance = np.abs(self._counts - end)
-            if distance.max() <= SETTLED:
+            if distance.max() <= SETTLED_DISTANCE:
                 return
             if self.port.now() > limit:
                 k = int(distance.argmax())
@@ -250,7 +250,7 @@ class ServoArm(Backend):
         """Hold the arm if a servo reports an error or falls far behind."""
         self._read()
         lag = np.abs(self._counts - expected)
-        if lag.max() > LAG:
+        if lag.max() > MAX_LAG:
             k = int(lag.argmax())
             self.hold()
             raise LinkError(

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
 
 BAUD = 1_000_000  # rate [bit/s] of the bus
-_ANSWER = 0.02  # time [s] that a servo's answer may take; USB adapters hold bytes back for up to 16 ms
-_TRIES = 8  # times that a question is asked before a servo counts as gone
+_ANSWER_TIMEOUT = 0.02  # time [s] that a servo's answer may take; USB adapters hold bytes back for up to 16 ms
+_MAX_TRIES = 8  # times that a question is asked before a servo counts as gone
 
 
 class Bus:
@@ -31,7 +31,7 @@ class Bus:
 
     def ping(self, servo: int) -> bool:
         """Whether a servo answers."""
-        return bool(self._ask(packet.packet(servo, packet.Instruction.PING), [servo], 0, tries=_TRIES))
+        return bool(self._ask(packet.packet(servo, packet.Instruction.PING), [servo], 0, tries=_MAX_TRIES))
 
     def read(self, servo: int, register: Register) -> int:
         """A register of one servo. Raises LinkError if it does not answer."""
@@ -45,7 +45,7 @@ class Bus:
 
         Raises LinkError if the servo does not answer or keeps another value.
         """
-        for _ in range(_TRIES):
+        for _ in range(_MAX_TRIES):
             self._ask(packet.write_registers(servo, register.address, register.pack(value)), [servo], 0, tries=1)
             if self.read(servo, register) == value:
                 return
@@ -73,7 +73,7 @@ class Bus:
             self.write(servo, TORQUE, int(on))
 
     def _require_answers(self, question: bytes, servos: Sequence[int], size: int) -> dict[int, bytes]:
-        answers = self._ask(question, servos, size, tries=_TRIES)
+        answers = self._ask(question, servos, size, tries=_MAX_TRIES)
         missing = [servo for servo in servos if servo not in answers]
         if missing:
             raise LinkError(
@@ -90,7 +90,7 @@ class Bus:
             while self.port.read(0.0):
                 pass  # late answers to an earlier question
             self.port.write(question)
-            end = self.port.now() + (_ANSWER + 0.002 * len(servos)) * (1 + attempt // 2)  # a busy computer is late
+            end = self.port.now() + (_ANSWER_TIMEOUT + 0.002 * len(servos)) * (1 + attempt // 2)  # computers are late
             while len(answers) < len(servos) and self.port.now() < end:
                 for answer in self._splitter.feed(self.port.read(0.002)):
                     self._take_answer(answer, servos, size, answers)

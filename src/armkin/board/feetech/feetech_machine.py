@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.servo_arm import LAG, SETTLED, ServoArm, job, servo_ids
+from armkin.board.backend.servo_arm import MAX_LAG, SETTLED_DISTANCE, ServoArm, job, servo_ids
 from armkin.board.feetech import registers
 from armkin.board.feetech.bus import Bus
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
 
-__all__ = ["LAG", "SETTLED", "ServoMachine", "job", "servo_ids"]
+__all__ = ["MAX_LAG", "SETTLED_DISTANCE", "ServoMachine", "job", "servo_ids"]
 
-_ENDLESS = 1 << 30  # position [counts] that bounds a servo without limits
+_MAX_COUNTS = 1 << 30  # position [counts] that bounds a servo without limits
 CATCH_UP_FACTOR = 1.5  # factor on the trajectory's speed that a servo may move at to keep up
 
 
@@ -61,7 +61,7 @@ class ServoMachine(ServoArm):
             ]
             for n in self.ids
         ]
-        return np.array([pair if any(pair) else [-_ENDLESS, _ENDLESS] for pair in pairs], dtype=np.int64)
+        return np.array([pair if any(pair) else [-_MAX_COUNTS, _MAX_COUNTS] for pair in pairs], dtype=np.int64)
 
     @staticmethod
     def _limit_value(register: registers.Register, raw: bytes) -> int:

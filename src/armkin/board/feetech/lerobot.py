@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.board.feetech import registers
+from armkin.board.feetech.registers import COUNTS_PER_TURN
 from armkin.errors import FileError, LinkError, UsageError
 from armkin.model.units import DEGREE
 
@@ -24,8 +25,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _MAX_BYTES = 1_000_000  # size [bytes], at most, of a calibration file
-_MIDDLE = 5.0  # distance [deg], at most, of a joint's zero from the middle of its limits
-_WHOLE = {
+_MIDDLE_DISTANCE = 5.0  # distance [deg], at most, of a joint's zero from the middle of its limits
+_VALUE_RANGES = {
     "id": (0, 253),
     "drive_mode": (0, 1),
     "homing_offset": (-4095, 4095),
@@ -88,7 +89,7 @@ def read_calibration(path: str) -> dict[int, Motor]:
         raise FileError(f"{path} is no calibration file of LeRobot: a JSON object of motors by their names", file=path)
     motors: dict[int, Motor] = {}
     for name, values in entries.items():
-        motor = Motor(name, **{key: _whole_number(path, name, values, key) for key in _WHOLE})
+        motor = Motor(name, **{key: _whole_number(path, name, values, key) for key in _VALUE_RANGES})
         if motor.id in motors:
             raise FileError(f"{path}: {motors[motor.id].name} and {name} have the same id {motor.id}", file=path)
         if motor.range_min >= motor.range_max:
@@ -100,7 +101,7 @@ def read_calibration(path: str) -> dict[int, Motor]:
 
 def _whole_number(path: str, name: str, values: Any, key: str) -> int:
     value = values.get(key) if isinstance(values, Mapping) else None
-    low, high = _WHOLE[key]
+    low, high = _VALUE_RANGES[key]
     if type(value) is not int or not low <= value <= high:
         complaint = "is missing" if value is None else f"is {str(value)[:40]}"
         raise FileError(f"{path}: {name}: {key} {complaint}: a whole number from {low} to {high}", file=path)
@@ -143,8 +144,8 @@ def _calibrated_motor(
         has = ", ".join(f"{motor.name} {key}" for key, motor in sorted(motors.items()))
         raise UsageError(f"{path}: joint {name} is servo {number}, which the file has not: it has {has}")
     motor = motors[number]
-    if counts != registers.COUNTS:
-        raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {registers.COUNTS}")
+    if counts != COUNTS_PER_TURN:
+        raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {COUNTS_PER_TURN}")
     if motor.name != name and name in (listed.name for listed in motors.values()):
         raise UsageError(f"{path}: joint {name} is servo {number}, which is {motor.name} in the file")
     return motor
@@ -153,10 +154,10 @@ def _calibrated_motor(
 def _check_middle(arm: Arm, joint: int) -> None:
     """Raise UsageError if a joint's zero is not about the middle of its limits, where LeRobot has the arm put."""
     middle = float(arm.lower[joint] + arm.upper[joint]) / 2 / DEGREE
-    if not abs(middle) <= _MIDDLE:
+    if not abs(middle) <= _MIDDLE_DISTANCE:
         raise UsageError(
             f"{arm.name}: the zero of {arm.joint_names[joint]} lies {abs(middle):.4g} deg from the middle of its "
-            f"limits, more than {_MIDDLE:g}",
+            f"limits, more than {_MIDDLE_DISTANCE:g}",
             advice="say which pose the middles of all ranges are",
             joint=arm.joint_names[joint],
             middle=middle,

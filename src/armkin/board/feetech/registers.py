@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-COUNTS = 4096  # positions a turn
+COUNTS_PER_TURN = 4096  # positions a turn
 
 
 class Register(NamedTuple):

@@ -13,11 +13,11 @@ if TYPE_CHECKING:
     from armkin.board.feetech.bus import Bus
     from armkin.robot_file.robot_keys import Gripper
 
-SPEED = 500.0  # speed [counts/s] of a gripper without max_speed, 44 deg/s
+DEFAULT_SPEED = 500.0  # speed [counts/s] of a gripper without max_speed, 44 deg/s
 ARRIVAL_COUNTS = 12  # distance [counts] from the goal, 1 degree, at which the jaw is at its goal
-STANDING = 1.0  # time [s] without a change of position after which the jaw holds something
+HOLD_S = 1.0  # time [s] without a change of position after which the jaw holds something
 ARRIVAL_S = 0.1  # time [s] without a change of position after which a jaw at its goal has arrived
-PERIOD = 0.02  # time [s] between readings
+READ_PERIOD = 0.02  # time [s] between readings
 
 
 def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bool]) -> float:
@@ -31,12 +31,12 @@ def move_gripper(bus: Bus, gripper: Gripper, value: float, stop: Callable[[], bo
     if not bus.read(number, registers.TORQUE):
         bus.write(number, registers.GOAL_POSITION, position)  # the jaw must not jump to an old goal
         bus.write(number, registers.TORQUE, 1)
-    speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else SPEED
+    speed = abs(per) * gripper.max_speed if gripper.max_speed is not None else DEFAULT_SPEED
     bus.write(number, registers.GOAL_SPEED, round(min(speed, 32767)))
     bus.write(number, registers.GOAL_POSITION, goal)
     since = port.now()
-    while position != goal and port.now() - since < (ARRIVAL_S if abs(position - goal) <= ARRIVAL_COUNTS else STANDING):
-        port.read(PERIOD)
+    while position != goal and port.now() - since < (ARRIVAL_S if abs(position - goal) <= ARRIVAL_COUNTS else HOLD_S):
+        port.read(READ_PERIOD)
         if stop():
             bus.write(number, registers.GOAL_POSITION, bus.read(number, registers.POSITION))
             raise StoppedError

@@ -8,7 +8,7 @@ from itertools import chain, islice
 from typing import TYPE_CHECKING
 
 from armkin.board.firmware.segments.remaining_plan import left_of
-from armkin.board.firmware.streaming import LEAD_BAD, MAX_LEAD, motion_batches, ramp_pieces, seconds_of, stream_frames
+from armkin.board.firmware.streaming import MAX_LEAD, NOISY_LEAD, motion_batches, ramp_pieces, seconds_of, stream_frames
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.motion_frame import MotionFrame
 from armkin.board.firmware.wire.protocol import Error, Status
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
     Lay = Callable[[Trajectory, Counts], Cut]
 
-_BEGINNING, _STOOD = 0.7, 1.0  # lengths [s] of a motion's beginning and of a stand in it that ends by itself
+_BEGINNING_TIME, _STAND_TIME = 0.7, 1.0  # lengths [s] of a motion's beginning and of a stand in it that ends by itself
 
 
 class _UnderWay:
@@ -61,7 +61,7 @@ class _UnderWay:
         plans = [plan, *(plan for *_, plan, k in islice(self._moves, 1, None) if k == 0)]
         left = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
         stood = session.deaf + session.port.now() - began
-        if left is None or left[1].seconds > _BEGINNING or stood > _STOOD:
+        if left is None or left[1].seconds > _BEGINNING_TIME or stood > _STAND_TIME:
             return None
         return left[0], seconds + left[1].elapsed
 
@@ -90,7 +90,7 @@ def carry_out(
         session.reopen()
         run.begin_anew(left[1])
         # a line that has turned out bad gets the lead of a bad line, then four times that, and at last the longest
-        least = min(max(LEAD_BAD, 4 * least), MAX_LEAD) if session.line.damaged else MAX_LEAD
+        least = min(max(NOISY_LEAD, 4 * least), MAX_LEAD) if session.line.damaged else MAX_LEAD
         plans_left = chain(left[0], plans_left)
 
 
@@ -145,7 +145,7 @@ def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: in
                 raise
             began, status = session.port.now(), _at_rest(session)
             stood, count = session.deaf + session.port.now() - began, status.counts[axis]
-            if not status.known >> axis & 1 or stood > _STOOD or _seconds_to(move, count, clock) > _BEGINNING:
+            if not status.known >> axis & 1 or stood > _STAND_TIME or _seconds_to(move, count, clock) > _BEGINNING_TIME:
                 raise
         session.reopen()
         least = MAX_LEAD

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.robot_file import Gripper
 
 _NO_LIMIT = 2**30  # limit [counts] of an axis without one
-_SLACK = 1.05  # factor on a motor's rate: cycles, rates of 15 bits and parabolas make a ramp's end that much faster
+_RATE_FACTOR = 1.05  # factor on a motor's rate: cycles, rates of 15 bits and parabolas make a ramp's end so much faster
 _SERVO_RANGE = (400, 2600)  # pulse lengths [us] that the boards can make
 
 
@@ -220,7 +220,7 @@ def _check_servo(name: str, low: int, high: int) -> None:
 
 def _board_rate(board: Board, rate: float) -> int:
     fastest = board.clock // board.min_interval
-    return max(1, min(math.ceil(rate * _SLACK - 1e-9), fastest))
+    return max(1, min(math.ceil(rate * _RATE_FACTOR - 1e-9), fastest))
 
 
 def _board_accel(accel: float) -> int:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 _SLOW_SPEED = 26  # speed of the second approach, in 1/256 of the first: a tenth
 _MAX_COUNTS = 2**30  # greatest number of counts and of counts/s in a command
-_MARGIN = 1.25  # distance of a switch, at most, in a joint's ranges
+_SWITCH_RANGES = 1.25  # distance of a switch, at most, in a joint's ranges
 
 
 @dataclass(frozen=True)
@@ -237,8 +237,8 @@ def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
         if arm.prismatic[j]:
             raise UsageError(f"joint {name} has no limits: homing would not know how far to look")
         span = 2 * math.pi
-    travel = math.ceil(leader * (_MARGIN * span + homing.backoff * unit))
-    seconds = 2 * _MARGIN * span / speed + 4 * backoff / (leader * speed * _SLOW_SPEED / 256) + 5
+    travel = math.ceil(leader * (_SWITCH_RANGES * span + homing.backoff * unit))
+    seconds = 2 * _SWITCH_RANGES * span / speed + 4 * backoff / (leader * speed * _SLOW_SPEED / 256) + 5
     return Search(
         joint=j,
         switch=board.switches.index(homing.switch),

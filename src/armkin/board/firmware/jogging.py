@@ -20,7 +20,7 @@ from armkin.motion.plan.trajectory_proof import free_way
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-HANDLE = 0.25  # time [s] that a board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
+HANDLE_TIME = 0.25  # time [s] that a board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
 _MAX_SECONDS = 60.0  # length [s], at most, of a jog that is looked at
 SLOW_DIVISOR = 8  # divisor of max_speed for a lost position: at most an eighth
 
@@ -78,7 +78,7 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     if why is None:
         return math.inf
     left = free * abs(float(goal[joint] - q[joint])) - rate**2 / (2.0 * float(arm.max_accel[joint]))
-    seconds = left / abs(rate) - HANDLE
+    seconds = left / abs(rate) - HANDLE_TIME
     if seconds <= 0.0:
         raise NoSolutionError(f"{why.message} (at this speed it would not stand before it)", **why.fields)
     return seconds

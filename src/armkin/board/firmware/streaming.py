@@ -10,7 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.straight_lines import UNHEARD, Pieces
+from armkin.board.firmware.segments.straight_lines import UNHEARD_SHARE, Pieces
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.go_back_n import QUESTION_BYTES
 from armkin.board.firmware.wire.motion_frame import MotionFrame, motion_size
@@ -21,22 +21,22 @@ if TYPE_CHECKING:
     from armkin.board.firmware.wire.session import Session
 
 # [s] that the arm stands while the queue begins to fill, beyond what the frames take; at most; on a bad line.
-_LEAD, MAX_LEAD, LEAD_BAD = 0.0015, 0.6, 0.05
+_LEAD_TIME, MAX_LEAD, NOISY_LEAD = 0.0015, 0.6, 0.05
 _LEAD_BUSY = ((1.0, 0.25), (0.1, 0.1))  # load of each processor and lead [s]: a busy computer's next turn is not known
-_TICK = 20_000  # length [cycles], at most, of a tick of that pause
-_BATCH = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
-_MARGIN, _SPARE = 30, 0.002  # share and time [s]: a queue is dry below 1 / 32 and 2 ms more than the time to a stop
+_TICK_CYCLES = 20_000  # length [cycles], at most, of a tick of that pause
+_BATCH_SEGMENTS = (2, 6)  # segments in a frame, on a bad line or into a queue that is all but full, and on a good line
+_MARGIN_FACTOR, _SPARE_TIME = 30, 0.002  # a queue is dry below 1 / 32 and 2 ms [s] more than the time to a stop
 _SLOW_STOP = 0.024  # time to a stop [s] from which on a queue can be dry
 _QUEUE_RATE = 1 + 33 / 32  # motion [s] that each second since rest wants in the queue
 _MAX_UNHEARD = 0.045  # length [s] of a segment before the first step, at most, in which the arm may wait for its queue
-_INTERVAL = 50_000  # interval [cycles] of a tick, at most
-_SEEN = 64  # segments of a beginning whose way to the board is reckoned: both ramps of a short move
+_MAX_INTERVAL = 50_000  # interval [cycles] of a tick, at most
+_RECKONED_SEGMENTS = 64  # segments of a beginning whose way to the board is reckoned: both ramps of a short move
 # Segments of a motion's first frames: a short one is there soon, those behind it last a while.
-_STARTING = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
+_FIRST_BATCHES = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
 _FAR_ANSWER = 0.005  # time [s] of the slowest answer from which on a short move cannot wait for credit
-_BUSY = 0.0003, 0.0005  # time [s] that a board is busy with a frame, and with a segment of it
+_BUSY_TIMES = 0.0003, 0.0005  # time [s] that a board is busy with a frame, and with a segment of it
 _TICK_FACTOR = 2.2  # factor on these times between ticks
-_ACK = 16  # size [bytes] of an answer
+_ACK_BYTES = 16  # size [bytes] of an answer
 
 
 def stream_frames(
@@ -88,7 +88,7 @@ def _may_follow_rest(session: Session, batch: MotionFrame) -> bool:
 
 def _earliest_follow(seconds: float) -> float:
     """Seconds before a rest, from when on a beginning of so many seconds may follow it in the queue."""
-    return _MARGIN * (seconds - _SPARE)
+    return _MARGIN_FACTOR * (seconds - _SPARE_TIME)
 
 
 def ramp_pieces(session: Session) -> Pieces:
@@ -122,8 +122,8 @@ def lead_time(
     the first step.
     """
     busy = next((seconds for load, seconds in _LEAD_BUSY if _processor_load(session) > load), 0.0)
-    bad = LEAD_BAD if session.line.damaged else 0.0
-    return max(least, busy, bad, min(_LEAD + _lateness(session, frames, unheard), MAX_LEAD))
+    bad = NOISY_LEAD if session.line.damaged else 0.0
+    return max(least, busy, bad, min(_LEAD_TIME + _lateness(session, frames, unheard), MAX_LEAD))
 
 
 def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
@@ -135,12 +135,12 @@ def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], un
     free = moves = 0.0  # free: when the line is; moves: when the arm does
     queued = list[float]()
     for k, (_, segments, size) in enumerate(frames):
-        may = queued[k - 2] + session.line.slowest + _ACK * bit if k > 1 else 0.0
+        may = queued[k - 2] + session.line.slowest + _ACK_BYTES * bit if k > 1 else 0.0
         free = max(free, may) + size * bit
         begins = max(free, queued[-1] if queued else 0.0)
-        ends = begins + _BUSY[0] + segments * _BUSY[1]
+        ends = begins + _BUSY_TIMES[0] + segments * _BUSY_TIMES[1]
         queued.append(ends + (_TICK_FACTOR - 1) * max(0.0, ends - max(begins, moves)) if k else ends)
-        moves = moves or ends + _LEAD + unheard
+        moves = moves or ends + _LEAD_TIME + unheard
     return queued
 
 
@@ -150,11 +150,11 @@ def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unhear
     The board's queue holds the time to a stop at any moment (section 7), which from rest is at most the time since then
     in which the arm would have speeded up evenly; a slow arm's need only not be empty.
     """
-    queued, ahead = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD - 1)
+    queued, ahead = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD_SHARE - 1)
     behind = elapsed = 0.0  # done: [s] of motion in all before a frame
     for k, (seconds, _, _) in enumerate(frames):
         if k:
-            stops = (elapsed - _SPARE - ahead * (_QUEUE_RATE - 1)) / _QUEUE_RATE
+            stops = (elapsed - _SPARE_TIME - ahead * (_QUEUE_RATE - 1)) / _QUEUE_RATE
             behind = max(behind, queued[k] - queued[0] - min(elapsed, max(_SLOW_STOP - ahead, stops)))
         elapsed += seconds
     return behind
@@ -180,12 +180,12 @@ def motion_batches(
     room = min(session.info.frame - 4, session.info.receive - QUESTION_BYTES - 6)
     places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
     source = (s.for_axes(moving) for s in move.segments)
-    segments: list[Segment] = list(islice(source, _SEEN))
+    segments: list[Segment] = list(islice(source, _RECKONED_SEGMENTS))
     sizes = _insert_pause(session, segments, room, clock, least) if segments else []
     begins = not sizes
-    while segments := segments + list(islice(source, max(0, _BATCH[1] + 1 - len(segments)))):
-        fits = _BATCH[1] if begins else max(_BATCH[0], session.pending[1])  # more would wait for room
-        fits = _BATCH[0] if line.noisy else min(fits, _BATCH[1])
+    while segments := segments + list(islice(source, max(0, _BATCH_SEGMENTS[1] + 1 - len(segments)))):
+        fits = _BATCH_SEGMENTS[1] if begins else max(_BATCH_SEGMENTS[0], session.pending[1])  # more would wait for room
+        fits = _BATCH_SEGMENTS[0] if line.noisy else min(fits, _BATCH_SEGMENTS[1])
         most = sizes.pop(0) if sizes else fits
         begins = False
         n = _fitting_count(segments, most, room)
@@ -202,13 +202,13 @@ def _insert_pause(session: Session, segments: list[Segment], room: int, clock: i
     """Put the pause before a motion into its segments; how many of them its first frames have, none for no pause."""
     pause, sizes = _plan_start(session, segments, room, clock, least)
     # Behind a rest, for which it may wait until less is left there: the queue is filled while that lasts.
-    waits = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH[1], room)], clock))
+    waits = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH_SEGMENTS[1], room)], clock))
     if not session.line.damaged and min(_seconds_queued(session), waits) >= pause:
         return []
     if longer := delay_segment(segments[0], pause, clock):
         segments[0] = longer
     else:
-        ticks = math.ceil(pause * clock / _TICK)
+        ticks = math.ceil(pause * clock / _TICK_CYCLES)
         segments.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(segments[0].rates)))
         sizes[0] += 1
     return sizes
@@ -239,7 +239,7 @@ def _is_unheard(first: Segment) -> bool:
 def delay_segment(first: Segment, pause: float, clock: int) -> Segment | None:
     """The first segment of a motion, `pause` seconds longer for one in front of it; None where that would be felt."""
     interval = first.interval + math.ceil(pause * clock / first.ticks)
-    fits = interval <= _INTERVAL and first.ticks * interval < _MAX_UNHEARD * clock
+    fits = interval <= _MAX_INTERVAL and first.ticks * interval < _MAX_UNHEARD * clock
     return replace(first, interval=interval) if fits and _is_unheard(first) else None
 
 
@@ -249,7 +249,7 @@ def _plan_start(
     """How long the arm stands before a motion from rest, and the segments of its first frames: it begins soonest so."""
     ways = list[tuple[float, float, list[int]]]()
     unheard = seconds_of(segments[:1], clock) if _is_unheard(segments[0]) else 0.0
-    for sizes in [(_BATCH[0] - 1,)] if session.line.noisy else _STARTING:
+    for sizes in [(_BATCH_SEGMENTS[0] - 1,)] if session.line.noisy else _FIRST_BATCHES:
         frames = _first_frames(segments, sizes, room, clock, paused=not unheard)
         pause = lead_time(session, frames, least, unheard)
         ways.append((_queued_times(session, frames, unheard)[0] + pause, pause, list(sizes)))
@@ -262,7 +262,7 @@ def _first_frames(
     """The first frames of a motion from rest, behind a pause or not: seconds, segments and bytes of each."""
     frames, first = list[tuple[float, int, int]](), 0
     while first < len(segments):
-        most = sizes[len(frames)] if len(frames) < len(sizes) else _BATCH[1]
+        most = sizes[len(frames)] if len(frames) < len(sizes) else _BATCH_SEGMENTS[1]
         n = max(1, _fitting_count(segments[first:], most, room))
         part, more = segments[first : first + n], paused and first == 0
         size = motion_size(len(part[0].rates), part) + 6 + more * 17

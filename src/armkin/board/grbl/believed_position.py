@@ -24,9 +24,9 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.model.arm import Arm
 
-MARK = 1000  # offset [units] in G92, and up to as much again at random: no other board has the same, 0 means a reset
+MARK_OFFSET = 1000  # offset [units] in G92, and at random as much again: no other board has the same, 0 means a reset
 Kept = dict[str, list[float] | str]
-_LASTING = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
+_LASTING_OFFSETS = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
 
 
 class Place:
@@ -71,7 +71,7 @@ class Place:
         """Take somebody's word that the motors stand at these counts: set the mark, and record what GRBL keeps."""
         self._session.ask("G21G54G49")
         steps = self._machine_steps(self._session.sure_status())
-        mark = MARK + random.randrange(MARK)
+        mark = MARK_OFFSET + random.randrange(MARK_OFFSET)
         self._read_offsets()
         values = zip(steps, self._axes, np.asarray(self._offsets_left["G54"], dtype=float), strict=True)
         words = [f"{axis.letter}{n / axis.steps - g54 - mark:.5f}" for n, axis, g54 in values]
@@ -97,7 +97,7 @@ class Place:
         if not reason:
             self._read_offsets()
             left = self.record.note
-            if left is None or any(left.marks.get(name) != self._offsets_left[name] for name in _LASTING):
+            if left is None or any(left.marks.get(name) != self._offsets_left[name] for name in _LASTING_OFFSETS):
                 reason = "another program has set an offset while the arm moved"
         if reason:
             self.forget(reason)
@@ -117,7 +117,7 @@ class Place:
             name: list(values) if name == "TLO" else [values[k] for k in ours if k < len(values)]
             for name, values in offsets.items()
         }
-        systems = (word for word in words if word.partition(".")[0] in _LASTING)
+        systems = (word for word in words if word.partition(".")[0] in _LASTING_OFFSETS)
         scaled = (word for word in words if word.startswith("G51"))
         self._offsets_left = {**own_offsets, "system": next(systems, "none"), "scale": next(scaled, "G50")}
         return words[0]

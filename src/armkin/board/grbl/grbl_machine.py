@@ -26,15 +26,15 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
     from armkin.robot_file.robot_keys import Gripper
 
-_REST = 30.0  # time [s] that a hold may take
-_FRESH = 5.0  # time [s] after which the settings are read again: jogging prepares three times a second
+_HOLD_TIMEOUT = 30.0  # time [s] that a hold may take
+_MAX_SETTINGS_AGE = 5.0  # time [s] after which the settings are read again: jogging prepares three times a second
 
 
 class GrblMachine(StepperArm):
     """An arm on the GRBL board behind an open port."""
 
     cure = "home it, or put it in its home pose and say so"
-    piece = trajectory_to_gcode.PIECE
+    piece = trajectory_to_gcode.PIECE_TIME
     homes = True
     differences = (
         "GRBL has no checksum: a damaged line may move the arm wrongly until a report, some 0.2 s later, tells",
@@ -153,7 +153,7 @@ class GrblMachine(StepperArm):
     def hold(self) -> None:
         """Stop along the path and clear what is queued; the position stays known."""
         self.session.realtime(replies.HOLD)
-        end = self.port.now() + _REST
+        end = self.port.now() + _HOLD_TIMEOUT
         while (status := self.session.status()).state not in ("Idle", "Alarm") and (
             status.state != "Hold" or status.detail
         ):
@@ -195,7 +195,7 @@ class GrblMachine(StepperArm):
         wrong = [
             difference
             for difference in self.wrong()
-            if difference.number in settings.HOMING and difference.actual is not None
+            if difference.number in settings.HOMING_SETTINGS and difference.actual is not None
         ]
         if wrong:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
@@ -218,7 +218,7 @@ def _serious_differences(machine: GrblMachine) -> list[settings.Difference]:
     $$ has no checksum: two readings must find them.
     """
     session, present = machine.session, machine.port.now()
-    for _ in range(2 if session.was_reset or present > machine.settings_time + _FRESH else 0):
+    for _ in range(2 if session.was_reset or present > machine.settings_time + _MAX_SETTINGS_AGE else 0):
         machine.settings, machine.settings_time = session.settings(), present
         if not any(difference.serious for difference in machine.wrong()):
             break

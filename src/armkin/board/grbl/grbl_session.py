@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
 
 BAUD = 115_200  # rate [bit/s] of the port
-_BOOT = 4.0  # time [s] that a board may take to greet after its port was opened
-_ANSWER = 2.0  # time [s] that a line may take that moves nothing
-_POLL = 0.1  # time [s] between status requests in motion
-_SILENCE = 2.0  # time [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
-_HELD = 15.0  # time [s] without an answer while GRBL holds: its button was pressed, or a byte was damaged into a hold
+_BOOT_TIMEOUT = 4.0  # time [s] that a board may take to greet after its port was opened
+_ANSWER_TIMEOUT = 2.0  # time [s] that a line may take that moves nothing
+_POLL_PERIOD = 0.1  # time [s] between status requests in motion
+_SILENCE_TIMEOUT = 2.0  # time [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
+_HELD_TIMEOUT = 15.0  # time [s] without an answer while GRBL holds: a button or a damaged byte told it to
 _LATE_ANSWERS = 0.05  # time [s] that answers to another program's lines may come behind
-_NONSENSE = ")&"  # characters that are no line, whatever they are the end of
-_KEPT = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
-_READINGS = 13  # readings, at most, of an answer until three in a row agree
-_UNCLEAR = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
-_REPORT = 0.5  # time [s] that a status report may take
+_NONSENSE_CHARACTERS = ")&"  # characters that are no line, whatever they are the end of
+_KEPT_PARAMETERS = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
+_MAX_READINGS = 13  # readings, at most, of an answer until three in a row agree
+_UNCLEAR_TEXT = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
+_REPORT_TIMEOUT = 0.5  # time [s] that a status report may take
 _MAX_LINE = 4096  # characters, at most, without a line end: no GRBL speaks there
 
 
@@ -76,7 +76,7 @@ class Session:
 
     def wake(self) -> Report:
         """A first status report. Raises LinkError if none comes."""
-        end = self.port.now() + _BOOT
+        end = self.port.now() + _BOOT_TIMEOUT
         while self.port.now() < end:
             self.port.write(replies.STATUS)
             with suppress(GrblError):  # another program's line may fail, or memory that a new board has not written
@@ -109,9 +109,9 @@ class Session:
         `)` ends a comment, `&` begins no word. A comment from `;` on ends with the line alone, which GRBL then obeys.
         """
         self.realtime(replies.JOG_CANCEL)  # grblHAL drops an open line
-        self._send(_NONSENSE)
+        self._send(_NONSENSE_CHARACTERS)
         try:
-            obeyed = self._wait(lambda: not self._sent, _ANSWER)
+            obeyed = self._wait(lambda: not self._sent, _ANSWER_TIMEOUT)
         except GrblError as error:
             if not error.error:
                 raise
@@ -121,14 +121,14 @@ class Session:
         if not obeyed:
             raise LinkError(f"GRBL on {self.port.name} takes no lines: does it dwell for another program?")
         self.realtime(replies.HOLD)
-        self._wait(lambda: self.status().state not in ("Run", "Jog"), _SILENCE)
+        self._wait(lambda: self.status().state not in ("Run", "Jog"), _SILENCE_TIMEOUT)
         self.reset()
         raise LinkError(
             f"another program had left a line open on {self.port.name}, in a comment, and GRBL obeyed it; it was "
             "stopped"
         )
 
-    def ask(self, line: str, patience: float = _ANSWER) -> list[str]:
+    def ask(self, line: str, patience: float = _ANSWER_TIMEOUT) -> list[str]:
         """Send one line, wait for its ``ok``, and return what came before it."""
         self._other_lines.clear()
         self._send(line)
@@ -137,7 +137,7 @@ class Session:
             raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
         return list(self._other_lines)
 
-    def status(self, patience: float = _REPORT) -> Report:
+    def status(self, patience: float = _REPORT_TIMEOUT) -> Report:
         """A fresh status report."""
         for _ in range(6):  # a request or its answer may be lost
             self.report = None
@@ -159,7 +159,7 @@ class Session:
     def stable_offsets(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
         """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
         readings: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
-        for _ in range(_READINGS):
+        for _ in range(_MAX_READINGS):
             reading: dict[str, Any] = dict(
                 pair for line in self.ask("$#") if (pair := replies.parse_offset(line)) is not None
             )
@@ -168,9 +168,9 @@ class Session:
             for name, value in reading.items():
                 last, count = readings.get(name, (None, 0))
                 readings[name] = value, count + 1 if value == last else 1
-            if all(readings.get(name, (None, 0))[1] >= 3 for name in _KEPT):
-                return {name: readings[name][0] for name in _KEPT[1:]}, readings["$G"][0]
-        raise LinkError(_UNCLEAR.format(port=self.port.name))
+            if all(readings.get(name, (None, 0))[1] >= 3 for name in _KEPT_PARAMETERS):
+                return {name: readings[name][0] for name in _KEPT_PARAMETERS[1:]}, readings["$G"][0]
+        raise LinkError(_UNCLEAR_TEXT.format(port=self.port.name))
 
     def settings(self) -> dict[int, float]:
         """The answer to ``$$``: number -> value."""
@@ -195,14 +195,15 @@ class Session:
                 return False
             self._not_reset()
             before, present = self._heard, self.port.now()
-            if present > time_asked + _POLL:
+            if present > time_asked + _POLL_PERIOD:
                 time_asked = present
                 self.port.write(replies.STATUS)
             self._pump(0.01)
             if self._heard != before:
                 quiet = self.port.now()
             state = "" if self.report is None else self.report.state
-            if self.port.now() > quiet + (_HELD if state in ("Hold", "Door") else _SILENCE) + self._dwell_seconds():
+            timeout = _HELD_TIMEOUT if state in ("Hold", "Door") else _SILENCE_TIMEOUT
+            if self.port.now() > quiet + timeout + self._dwell_seconds():
                 state_text = f"GRBL on {self.port.name}, in state {state or '?'},"
                 raise LinkError(f"{state_text} has left {waiting} bytes without an answer")
         self._not_reset()
@@ -288,9 +289,9 @@ def _agreeing_reading(read: Callable[[], T], port: str, accepts: Callable[[T], b
     Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.
     """
     last, same = read(), 1
-    for _ in range(_READINGS):
+    for _ in range(_MAX_READINGS):
         before, last = last, read()
         same = same + 1 if last and last == before else 1
         if same == 3 or (accepts(before) and accepts(last)):
             return last
-    raise LinkError(_UNCLEAR.format(port=port))
+    raise LinkError(_UNCLEAR_TEXT.format(port=port))

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.grbl.trajectory_to_gcode import PIECE
+from armkin.board.grbl.trajectory_to_gcode import PIECE_TIME
 from armkin.errors import LinkError
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import exact_pulses, pulses
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 PATH_DISTANCE = 2.0  # distance [steps] of a motor from the path: GRBL's own rounding and its reports' is below 1
 LEAD_TIME = 0.3  # time [s] ahead of the plan, at most: GRBL is never faster than it was told
-CREEP = 0.1, 3.0  # part [s] of the plan, and time [s] that GRBL takes for it when it no longer moves
-_WINDOW = 250  # points of the path that are looked at, 10 s
+CREEP_TIMES = 0.1, 3.0  # part [s] of the plan, and time [s] that GRBL takes for it when it no longer moves
+_WINDOW_POINTS = 250  # points of the path that are looked at, 10 s
 
 
 class Watch:
@@ -69,15 +69,15 @@ class Watch:
         )
 
     def _creep_fault(self, first: float, last: float, elapsed: float) -> str | None:
-        if last >= min(self._plan_time + CREEP[0], float(self._times[-1])):
+        if last >= min(self._plan_time + CREEP_TIMES[0], float(self._times[-1])):
             self._plan_time, self._progress_time, self._pause = last, elapsed, 0.0
         self._pause = max(self._pause, last - first)
-        return "it hardly moves on" if elapsed - self._progress_time > CREEP[1] + self._pause else None
+        return "it hardly moves on" if elapsed - self._progress_time > CREEP_TIMES[1] + self._pause else None
 
     def _plan_times(self, counts: Array) -> tuple[float, float] | None:
         """Seconds of the plan when the motors stand at these counts, first and last; None: beside the path."""
         begin = max(self._points_passed - 1, 0)
-        points = self._points[begin : begin + _WINDOW + 1]
+        points = self._points[begin : begin + _WINDOW_POINTS + 1]
         if len(points) == 1:
             return (0.0, 0.0) if np.abs(counts - points[0]).max() <= PATH_DISTANCE else None
         way = np.diff(points, axis=0)
@@ -99,7 +99,7 @@ def _path_samples(job: Job) -> tuple[Array, Array]:
     arm = job.trajectory.arm
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
     for stretch, began in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
-        t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE)), 1) + 1)[1:]
+        t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE_TIME)), 1) + 1)[1:]
         sampled = stretch.evaluate(t)
         times.append(began + t)
         points.append(

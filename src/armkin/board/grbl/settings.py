@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 from armkin.board.grbl.replies import LETTERS
 
-_WHOLE = (1, 3, 10, 13, 20, 22, 23, 32, 384)  # settings of whole numbers
-HOMING = (22, 23)  # settings that only homing needs
+_INTEGER_SETTINGS = (1, 3, 10, 13, 20, 22, 23, 32, 384)  # settings of whole numbers
+HOMING_SETTINGS = (22, 23)  # settings that only homing needs
 G92_VOLATILE = 384  # setting of grblHAL: 1 clears G92 when the board loses its power
 COARSE_STEPS = 500.0  # resolution [steps a unit] beyond which GRBL's three decimals do not tell every step
 
@@ -49,7 +49,7 @@ class Difference:
 
     def line(self) -> str:
         """The line that mends it; grblHAL takes no 255.000 where it wants a whole number."""
-        return f"${self.number}={self.expected:.0f}" if self.number in _WHOLE else f"${self.number}={self.expected:.3f}"
+        return f"${self.number}={self.expected:.{0 if self.number in _INTEGER_SETTINGS else 3}f}"
 
 
 def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
@@ -90,7 +90,7 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
             continue
         slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
         differing.append(
-            Difference(number, meaning, actual_value, value, serious=not slower and number not in (1, *HOMING))
+            Difference(number, meaning, actual_value, value, serious=not slower and number not in (1, *HOMING_SETTINGS))
         )
     return differing
 

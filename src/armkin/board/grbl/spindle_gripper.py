@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.board.grbl.grbl_session import Session
     from armkin.robot_file.robot_keys import Gripper
 
-GRIPPING = 0.5  # time [s] that a gripper without max_speed takes
+GRIP_TIME = 0.5  # time [s] that a gripper without max_speed takes
 
 
 class Spindle:
@@ -38,7 +38,7 @@ class Spindle:
                     f"GRBL does not give out S {value:g}: {setting_text} ($30: its greatest S, $32: laser mode)"
                 )
         speed = gripper.max_speed
-        seconds = GRIPPING if speed is None else abs(gripper.closed - gripper.open) / speed
+        seconds = GRIP_TIME if speed is None else abs(gripper.closed - gripper.open) / speed
         self._session.ask(f"M3S{value:.3f}", patience=seconds + 5.0)
         self.value = value
         self._session.ask(f"G4P{seconds:.3f}", patience=seconds + 5.0)

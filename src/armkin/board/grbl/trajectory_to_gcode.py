@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.motion.timing.trajectory import Stretch, Trajectory
 
-PIECE = 0.04  # length [s] of a curved stretch in one line: 25 lines a second
-HEAD = "G21G94"  # words in every line: another program may have left, or set between two, inches or inverse time
+PIECE_TIME = 0.04  # length [s] of a curved stretch in one line: 25 lines a second
+LINE_HEAD = "G21G94"  # words in every line: another program may have left, or set between two, inches or inverse time
 MIN_FEED = 0.01  # feed [units/min], at least: GRBL refuses 0
 
 
@@ -43,7 +43,7 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
                     for axis, value, moves in zip(axes, (goal + offset) / steps, goal != position, strict=True)
                     if moves
                 )
-                yield f"{HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
+                yield f"{LINE_HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
             else:
                 idle += t - before
             position, before = goal, t
@@ -53,5 +53,5 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
 
 def _piece_times(stretch: Stretch) -> Array:
     """Ends of a stretch's pieces [s]: one for a straight line, whose speed GRBL shapes as the plan does."""
-    count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PIECE)), 1)
+    count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / PIECE_TIME)), 1)
     return np.asarray(np.linspace(0.0, stretch.duration, count + 1)[1:])

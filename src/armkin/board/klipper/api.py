@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
 
 END = b"\x03"  # byte that ends a message
-_ANSWER = 5.0  # time [s] that a question may take
+_TIMEOUT = 5.0  # time [s] that a question may take
 _MAX_BYTES = 4_000_000  # size [bytes], at most, of one answer
 
 
@@ -29,7 +29,7 @@ class Api:
         self._answers: dict[int, dict[str, Any]] = {}
         self._waiting: set[int] = set()
 
-    def ask(self, method: str, params: dict[str, Any] | None = None, patience: float = _ANSWER) -> dict[str, Any]:
+    def ask(self, method: str, params: dict[str, Any] | None = None, patience: float = _TIMEOUT) -> dict[str, Any]:
         """A request and its result. Raises KlipperError if it is refused, LinkError if nothing comes."""
         number = self.send(method, params)
         end = self._port.now() + patience
@@ -46,7 +46,7 @@ class Api:
         fields_of = status if isinstance(status, dict) else {}
         return {name: fields if isinstance(fields := fields_of.get(name), dict) else {} for name in objects}
 
-    def run(self, script: str, patience: float = _ANSWER) -> None:
+    def run(self, script: str, patience: float = _TIMEOUT) -> None:
         """Run lines of G-code, and wait until they are done."""
         self.ask("gcode/script", {"script": script}, patience)
 

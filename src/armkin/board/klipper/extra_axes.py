@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 LETTERS = tuple("ABCDHIJKL")  # letters that Klipper leaves to extra axes and that begin no G-code
 SOCKETS = "~/printer_data/comms/klippy.sock", "/tmp/klippy_uds"  # paths where Klipper's API server mostly is
-RATE = 10.0  # speed [units/s] of the virtual axis X that carries the time: see trajectory_to_g1_lines.py
-PIECE = 0.01  # length [s] of one line
+TIME_RATE = 10.0  # speed [units/s] of the virtual axis X that carries the time: see trajectory_to_g1_lines.py
+PIECE_TIME = 0.01  # length [s] of one line
 MAX_ACCEL = 1000.0  # acceleration [units/s2] of X
 
 
@@ -49,8 +49,8 @@ class Axis:
 
     @property
     def corner(self) -> float:
-        """[units/s] that the speed may change from one line to the next: what its acceleration makes of PIECE."""
-        return 1.5 * self.max_accel * PIECE + 1.0 / self.steps / PIECE
+        """[units/s] that the speed may change from one line to the next: what its acceleration makes of PIECE_TIME."""
+        return 1.5 * self.max_accel * PIECE_TIME + 1.0 / self.steps / PIECE_TIME
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def printer_cfg(axes: Sequence[Axis]) -> str:
     text = [
         "[printer]",
         "kinematics: none",
-        f"max_velocity: {RATE:g}",
+        f"max_velocity: {TIME_RATE:g}",
         f"max_accel: {MAX_ACCEL:g}",
         "",
         "[idle_timeout]",
@@ -110,7 +110,7 @@ def printer_cfg(axes: Sequence[Axis]) -> str:
 def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
     """The settings of the axes' sections as Klipper tells them: section -> option -> value."""
     sections: dict[str, dict[str, Any]] = {
-        "printer": {"kinematics": "none", "max_velocity": RATE, "max_accel": MAX_ACCEL}
+        "printer": {"kinematics": "none", "max_velocity": TIME_RATE, "max_accel": MAX_ACCEL}
     }
     for axis in axes:
         sections[f"manual_stepper {axis.section}"] = {
@@ -132,7 +132,7 @@ def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Differe
     kinematics = printer.get("kinematics")
     if kinematics != "none":
         wrong.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
-    for option, least in (("max_velocity", RATE), ("max_accel", MAX_ACCEL)):
+    for option, least in (("max_velocity", TIME_RATE), ("max_accel", MAX_ACCEL)):
         value = printer.get(option)
         if not isinstance(value, int | float) or value < least:
             wrong.append(Difference(f"[printer] {option}", _value_text(value), f"at least {least:g}"))

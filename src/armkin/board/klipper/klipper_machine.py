@@ -20,7 +20,7 @@ from armkin.board.backend.sent_positions import Job, braking_time
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.klipper import trajectory_to_g1_lines
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.extra_axes import PIECE, Axis, Difference, axes_of, differences
+from armkin.board.klipper.extra_axes import PIECE_TIME, Axis, Difference, axes_of, differences
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-_CHUNK = 10  # lines in one request
-_PENDING = 8  # requests, at most, that wait: Klipper answers when it has taken them
-_SPARE = 0.75  # motion [s] sent ahead of what braking takes: Klipper drains its queue when it holds less than 0.25 s
+_CHUNK_LINES = 10  # lines in one request
+_MAX_PENDING = 8  # requests, at most, that wait: Klipper answers when it has taken them
+_SPARE_TIME = 0.75  # motion [s] sent ahead of what braking takes: Klipper drains a queue of less than 0.25 s
 _MAX_COORDINATE = 1e9  # coordinate [units], at most, of a place that can be
-_REST = 30.0  # time [s] until what was sent must be done
+_REST_TIMEOUT = 30.0  # time [s] until what was sent must be done
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
@@ -43,7 +43,7 @@ def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
 class KlipperMachine(StepperArm):
     """An arm behind the socket of Klipper's API server."""
 
-    piece = PIECE
+    piece = PIECE_TIME
     differences = (
         "Klipper tells the position that it was commanded; a restart, a shutdown and motors switched off lose it",
         "a stop takes effect when Klipper has carried out what it holds, about a second later; M112 stops at once, "
@@ -132,16 +132,16 @@ class KlipperMachine(StepperArm):
         source = iter(lines)
         self.api.run(trajectory_to_g1_lines.HEAD)
         began, stopping = self.port.now(), False
-        while chunk := [line for _, line in zip(range(_CHUNK), source, strict=False)]:
+        while chunk := [line for _, line in zip(range(_CHUNK_LINES), source, strict=False)]:
             self.api.send("gcode/script", {"script": "\n".join(chunk)})
-            ahead = began + lines.sent - _SPARE - ramp
-            while self.api.count_waiting() > _PENDING or (not stopping and self.port.now() < ahead):
+            ahead = began + lines.sent - _SPARE_TIME - ramp
+            while self.api.count_waiting() > _MAX_PENDING or (not stopping and self.port.now() < ahead):
                 if not stopping and self._stop():
                     stopping = True
                     lines.brake(ramp)
                 self.api.pump(0.01)
                 report(min(self.port.now() - began, job.duration))
-                if self.port.now() - began > lines.sent + _REST:
+                if self.port.now() - began > lines.sent + _REST_TIMEOUT:
                     raise LinkError(
                         f"Klipper on {self.port.name} has left {self.api.count_waiting()} requests unanswered"
                     )
@@ -149,7 +149,7 @@ class KlipperMachine(StepperArm):
 
     def _settle(self) -> None:
         """Wait until all that Klipper holds is done, and read where the arm stands."""
-        self.api.run("M400", _REST)
+        self.api.run("M400", _REST_TIMEOUT)
         self.api.count_waiting()
         self._read()
 

@@ -1,7 +1,7 @@
 """A trajectory as G1 lines of Klipper's extra axes.
 
 Klipper stops between moves of extra axes alone, for its look-ahead knows X, Y and Z (toolhead.py, `calc_junction`: both
-moves must be kinematic). So X carries the time: with `kinematics: none` no motor hangs on it, it goes on by RATE a
+moves must be kinematic). So X carries the time: with `kinematics: none` no motor hangs on it, it goes on by TIME_RATE a
 second, and the other axes follow it in proportion. What Klipper's planner makes of that is the plan's own time law, in
 pieces of constant speed, 100 a second; when lines run out it brakes within the axes' LIMIT_ACCEL.
 """
@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.klipper.extra_axes import PIECE, RATE, Axis
+from armkin.board.klipper.extra_axes import PIECE_TIME, TIME_RATE, Axis
 from armkin.motors import exact_pulses, pulses
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
 
 HEAD = "G90\nM220 S100\nG92 X0"  # words before a motion: absolute values, no override of the speed, the time begins
-_ROWS = 256  # lines worked out at once
+_CHUNK_LINES = 256  # lines worked out at once
 _SHORT_PIECE = 1e-4  # length [s] below which a piece joins the next one: X has five decimals
 
 
@@ -45,12 +45,12 @@ class Lines:
 
     def brake(self, seconds: float) -> None:
         """Come to rest in so many seconds from here."""
-        self._slower = PIECE / max(seconds, PIECE)
+        self._slower = PIECE_TIME / max(seconds, PIECE_TIME)
 
     def __iter__(self) -> Iterator[str]:
         times, t = _piece_times(self._job.trajectory), 0.0
-        for begin in range(0, len(times), _ROWS):
-            chunk = times[begin : begin + _ROWS]
+        for begin in range(0, len(times), _CHUNK_LINES):
+            chunk = times[begin : begin + _CHUNK_LINES]
             for time, values in zip(chunk.tolist(), self._values_at(chunk), strict=True):
                 if self._slower is not None:
                     break
@@ -59,10 +59,10 @@ class Lines:
         pace = 1.0
         while self._slower is not None and t < self._job.duration and pace > 0.0:
             pace = max(0.0, pace - self._slower)
-            t = min(self._job.duration, t + PIECE * pace)
+            t = min(self._job.duration, t + PIECE_TIME * pace)
             rests = t == self._job.duration or pace == 0.0
             yield self._line_to(
-                self.sent + PIECE, self._rest_position(t) if rests else self._values_at(np.array([t]))[0]
+                self.sent + PIECE_TIME, self._rest_position(t) if rests else self._values_at(np.array([t]))[0]
             )
 
     def _values_at(self, t: Array) -> list[list[float]]:
@@ -82,14 +82,14 @@ class Lines:
         """The line to these places, which X reaches at second x."""
         self.sent = x
         words = " ".join(f"{axis.letter}{value:.6f}" for axis, value in zip(self._axes, values, strict=True))
-        return f"G1 X{RATE * x:.5f} {words} F{60 * RATE:g}"
+        return f"G1 X{TIME_RATE * x:.5f} {words} F{60 * TIME_RATE:g}"
 
 
 def _piece_times(trajectory: Trajectory) -> Array:
-    """Ends of the pieces [s]: every stretch in equal ones of PIECE at most."""
+    """Ends of the pieces [s]: every stretch in equal ones of PIECE_TIME at most."""
     ends = [np.zeros(0)]
     for stretch, began in zip(trajectory.stretches, trajectory.begins, strict=False):
-        count = max(int(np.ceil(stretch.duration / PIECE)), 1)
+        count = max(int(np.ceil(stretch.duration / PIECE_TIME)), 1)
         ends.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
     times = np.concatenate(ends)
     return np.asarray(times[np.append(np.diff(times) > _SHORT_PIECE, np.ones(len(times[:1]), dtype=bool))])

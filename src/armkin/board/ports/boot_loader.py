@@ -12,12 +12,12 @@ from armkin.board.ports.serial_port import SerialPort
 
 _BAUD = 115200  # rate [bit/s] of the boot loaders
 # STK500 version 2 (Atmel AVR068): start, number, size, token, CMD_LEAVE_PROGMODE_ISP, checksum
-_LEAVE = bytes([0x1B, 1, 0, 1, 0x0E, 0x11, 0x1B ^ 1 ^ 1 ^ 0x0E ^ 0x11])
-_HEAD = 4  # bytes after a start, the last the token: so many zeros end any message that has begun by chance
+_LEAVE_MESSAGE = bytes([0x1B, 1, 0, 1, 0x0E, 0x11, 0x1B ^ 1 ^ 1 ^ 0x0E ^ 0x11])
+_HEAD_BYTES = 4  # bytes after a start, the last the token: so many zeros end any message that has begun by chance
 
 
 def leave_boot_loader(port: Port) -> None:
     """Tell a Mega's boot loader to start the program. What runs there instead hears eleven bytes of noise."""
     inner = port.inner if isinstance(port, Traced) else port
     if isinstance(inner, SerialPort):
-        inner.write_at(_BAUD, bytes(_HEAD) + _LEAVE)
+        inner.write_at(_BAUD, bytes(_HEAD_BYTES) + _LEAVE_MESSAGE)

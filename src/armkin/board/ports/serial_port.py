@@ -21,7 +21,7 @@ from armkin.board.ports.port import BAUD
 from armkin.board.ports.port_lock import Lock
 from armkin.errors import LinkError
 
-_READ = 0.005  # time [s] that a read waits at most
+_READ_TIMEOUT = 0.005  # time [s] that a read waits at most
 _MAX_READ = 4096  # size [bytes] of one read: what never falls silent must not keep it from the clock and from a stop
 
 
@@ -152,7 +152,7 @@ def _open_serial(name: str, baud: int, reset: bool) -> Any:
     import serial
 
     _check_address(name)
-    settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ, "write_timeout": 2.0, "do_not_open": True}
+    settings: dict[str, Any] = {"baudrate": baud, "timeout": _READ_TIMEOUT, "write_timeout": 2.0, "do_not_open": True}
     if "://" not in name:
         settings["exclusive"] = True if os.name == "posix" else None
     try:
@@ -218,7 +218,7 @@ class Found:
     adapter: str = ""  # a chip that other boards and servo buses have, "" if none
 
 
-_LOOKS = {
+_BOARD_NAMES = {
     (0x2341, 0x0043): "Arduino Uno",
     (0x2341, 0x0001): "Arduino Uno",
     (0x2341, 0x0243): "Arduino Uno",
@@ -235,7 +235,7 @@ _LOOKS = {
 
 
 # Chips of ESP32 boards (FluidNC, grblHAL) and servo bus adapters; no Arduino has them.
-_ADAPTERS = {
+_ADAPTER_NAMES = {
     (0x1A86, 0x55D3): "CH343: a servo bus?",
     (0x1A86, 0x55D4): "CH9102: an ESP32 or a servo bus?",
     (0x10C4, 0xEA60): "CP210x: an ESP32 or a servo bus?",
@@ -249,9 +249,9 @@ def list_ports() -> list[Found]:
 
     ports = []
     for port in tools.comports():
-        looks = _LOOKS.get((port.vid or 0, port.pid or 0), "")
+        looks = _BOARD_NAMES.get((port.vid or 0, port.pid or 0), "")
         if port.vid is None and looks == "" and port.description in ("n/a", None, port.name):
             continue  # a mainboard's empty ttyS
-        adapter = _ADAPTERS.get((port.vid or 0, port.pid or 0), "")
+        adapter = _ADAPTER_NAMES.get((port.vid or 0, port.pid or 0), "")
         ports.append(Found(port.device, port.description or "", port.hwid or "", looks, adapter))
     return sorted(ports, key=lambda f: (not f.board, f.device))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from armkin.board.sim.axis_counts import Axes, limit_rule_holds, row_value
 
-_TICK = 0.001  # length [s] of a tick
+_TICK_TIME = 0.001  # length [s] of a tick
 
 
 class Cruise:
@@ -38,9 +38,9 @@ class Cruise:
 
     def glide(self, target: float) -> None:
         """One millisecond with the share on its way to `target`."""
-        before, step = self.share, self.slope * _TICK
+        before, step = self.share, self.slope * _TICK_TIME
         self.share = min(before + step, target) if target > before else max(before - step, target)
-        moved = (before + self.share) / 2 * _TICK
+        moved = (before + self.share) / 2 * _TICK_TIME
         self.far += moved * max(abs(r) for r in self.rate)
         total = [d + r * moved for d, r in zip(self._done, self.rate, strict=True)]
         steps = [int(t) - int(d) for t, d in zip(total, self._done, strict=True)]
@@ -50,8 +50,8 @@ class Cruise:
     def clear(self) -> bool:
         """Whether the arm, were it to brake after the next millisecond, would stay within its limits."""
         image, base, known_axes = self.axes.image, self.axes.base, self.axes.known
-        share = min(self.share + self.slope * _TICK, 1.0)
-        ahead = share * _TICK + share * share / (2 * self.slope) + share * _TICK
+        share = min(self.share + self.slope * _TICK_TIME, 1.0)
+        ahead = share * _TICK_TIME + share * share / (2 * self.slope) + share * _TICK_TIME
         stop_counts = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
         for i, axis in enumerate(image.axes):
             if (

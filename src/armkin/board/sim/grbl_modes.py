@@ -14,10 +14,10 @@ from armkin.board.grbl.replies import LETTERS
 
 SYSTEMS = "G54", "G55", "G56", "G57", "G58", "G59"
 _NUMBER = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)")
-_MOTION = {0.0, 1.0, 80.0}
+_MOTION_CODES = {0.0, 1.0, 80.0}
 _OTHER_CODES = {4.0, 10.0, 28.0, 53.0, 92.0, 92.1}
 _GROUPS = (  # modal groups: one word of each in a line
-    _MOTION,
+    _MOTION_CODES,
     {17.0, 18.0, 19.0},
     {20.0, 21.0},
     {90.0, 91.0},
@@ -27,9 +27,9 @@ _GROUPS = (  # modal groups: one word of each in a line
     {4.0, 10.0, 28.0, 92.0, 92.1},
     {40.0},
 )
-_OFFSETS = frozenset({10.0, 43.1, 92.0, 92.1})
+_OFFSET_CODES = frozenset({10.0, 43.1, 92.0, 92.1})
 _USES_AXES = {10.0, 28.0, 43.1, 92.0}  # codes whose axis words are no move
-_KNOWN = set().union(_OTHER_CODES, *_GROUPS)
+_KNOWN_CODES = set().union(_OTHER_CODES, *_GROUPS)
 INCH = 25.4  # inch [mm]
 
 
@@ -119,7 +119,7 @@ class Modes:
     def _fit_error(self, codes: Sequence[float], values: dict[str, float]) -> int:
         """The error of words that do not fit together, 0 if they do."""
         codes_given = set(codes)
-        if codes_given - _KNOWN:
+        if codes_given - _KNOWN_CODES:
             return 20
         if any(sum(code in group for code in codes) > 1 for group in _GROUPS):
             return 21
@@ -134,7 +134,7 @@ class Modes:
 
     def _move_error(self, codes: set[float], values: dict[str, float]) -> int:
         """The error of axis words that are a move, 0 if it can be made."""
-        motion = next(iter(codes & _MOTION), self.motion)
+        motion = next(iter(codes & _MOTION_CODES), self.motion)
         if motion == 80.0:
             return 31
         feed = values.get("F", 0.0 if (93.0 in codes or self.inverse) and 94.0 not in codes else self.feed)
@@ -148,7 +148,7 @@ class Modes:
         if "F" in values or self.inverse:
             self.feed = values.get("F", 0.0) * (1.0 if self.inverse else unit)
         axis_values = {k: values[letter] * unit for k, letter in enumerate(LETTERS[: self.axes]) if letter in values}
-        if words.codes & _OFFSETS:
+        if words.codes & _OFFSET_CODES:
             self._set_offset(words, axis_values, position)
         elif 28.0 in words.codes:
             return list(self.offsets["G28"])
@@ -176,7 +176,7 @@ class Modes:
             self.tool = [axes.get(k, v) for k, v in enumerate(self.tool)]
 
     def _set_mode(self, code: float) -> None:
-        if code in _MOTION:
+        if code in _MOTION_CODES:
             self.motion = code
         elif code in (17.0, 18.0, 19.0):
             self.plane = code

@@ -8,8 +8,8 @@ from armkin.board.firmware.wire.protocol import Error, Image, Segment
 from armkin.board.sim.frame_fields import RefusedError
 from armkin.board_catalogue import Board
 
-_ALL = 0xFFFF
-_UNCHECKED = 1 << 23  # change in a window from which on an acceleration is not checked
+_MAX_UINT16 = 0xFFFF
+_MAX_CHANGE = 1 << 23  # change in a window, from which on an acceleration is not checked
 
 
 def times_valid(s: Segment, least: int) -> bool:
@@ -43,7 +43,7 @@ def _quarter_velocity(start: int, end: int, windows: int) -> int:
     if not windows:
         return (half + (change >> 1)) >> 1
     part = (1 << 23) // windows
-    return (half + (change >> 16) * part + ((change & _ALL) * part >> 16)) >> 1
+    return (half + (change >> 16) * part + ((change & _MAX_UINT16) * part >> 16)) >> 1
 
 
 class Velocity:
@@ -66,12 +66,12 @@ class Velocity:
     def begin(self, s: Segment) -> None:
         """Take up a segment, whose intervals have been checked."""
         part = self.board.clock // 20
-        cycles, time, windows = s.ticks * ((s.interval + s.last_interval) >> 1), _ALL, 0
+        cycles, time, windows = s.ticks * ((s.interval + s.last_interval) >> 1), _MAX_UINT16, 0
         if cycles < part:
             time = (cycles >> 4) * ((1 << 35) // part) >> 15
         else:
             window = (1 << 32) // part
-            windows = min(((cycles >> 16) * window >> 8) + ((cycles >> 8 & 255) * window >> 16), _ALL)
+            windows = min(((cycles >> 16) * window >> 8) + ((cycles >> 8 & 255) * window >> 16), _MAX_UINT16)
         pace = Pace((1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval, time, windows)
         self._last_pace, self._pace = self._pace if self._pace.time else Pace(time=time), pace
 
@@ -95,23 +95,23 @@ class Velocity:
         return float((1 << 15 + self._bits) / self.board.clock)
 
     def _budget(self, axis: int, time: int) -> int:
-        """What 5/4 of max_accel makes in a time; _UNCHECKED: it is not checked."""
-        step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._time_unit), _UNCHECKED - 1) + 1
-        low, high = step & _ALL, step >> 16
-        return (low * time >> 8) + (high * time << 8) if step < _UNCHECKED else _UNCHECKED << 16
+        """What 5/4 of max_accel makes in a time; _MAX_CHANGE: it is not checked."""
+        step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._time_unit), _MAX_CHANGE - 1) + 1
+        low, high = step & _MAX_UINT16, step >> 16
+        return (low * time >> 8) + (high * time << 8) if step < _MAX_CHANGE else _MAX_CHANGE << 16
 
     def _accelerate(self, axis: int, first: int, last: int, rate: int) -> None:
         """See firmware/src/core/batch.c."""
         (start, left, was), before, pace = self._last_ends[axis], self._last_pace, self._pace
         between = self._budget(axis, (before.time >> 1) + (pace.time >> 1))
-        if between == _UNCHECKED << 16 or not (was or rate):
+        if between == _MAX_CHANGE << 16 or not (was or rate):
             self._excess[axis] = (0, 0)
             return
         four_intervals = 4 * ((1 << self._bits) // self.board.min_interval)
         slack = four_intervals + ((abs(left) + abs(last)) >> 2 * self._bits - 37)
         change = abs(last - first)
         if pace.windows:
-            bends = pace.windows < _ALL and change >> 8 > self._budget(axis, pace.windows)
+            bends = pace.windows < _MAX_UINT16 and change >> 8 > self._budget(axis, pace.windows)
         else:
             bends = change > self._budget(axis, pace.time) + slack
         if bends or abs(first - left) > between + slack:

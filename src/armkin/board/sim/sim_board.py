@@ -19,7 +19,7 @@ from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.sim_motors import Motors
 from armkin.board_catalogue import Board
 
-_SILENCE = 0.5  # time [s] of silence after which the board holds
+_SILENCE_TIMEOUT = 0.5  # time [s] of silence after which the board holds
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class SimBoard:
             self._silent += step
             if self.inputs.power_cut():
                 self.motors.axes.known = 0
-            if self.motors.state in (State.MOVING, State.HOMING) and self._silent >= _SILENCE:
+            if self.motors.state in (State.MOVING, State.HOMING) and self._silent >= _SILENCE_TIMEOUT:
                 self._end_session(Error.SILENCE)
             if self.motors.state != State.IDLE:
                 self._watch()

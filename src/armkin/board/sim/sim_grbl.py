@@ -20,11 +20,11 @@ from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
 from armkin.board.sim.grbl_modes import Modes, Words
 
-BLOCKS = 15  # blocks of the planner
-_LINE = 80  # length [bytes], at most, of a line
-_SEEN = 10  # reports between two that tell offset and overrides
-_FEED = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides [%] by their byte; 0x90 takes them back
-_WHOLE = {1, 3, 10, 13, 20, 21, 22, 23, 32, 384}  # settings of whole numbers
+MAX_BLOCKS = 15  # blocks of the planner
+_MAX_LINE_BYTES = 80  # length [bytes], at most, of a line
+_OFFSET_REPORT_PERIOD = 10  # reports between two that tell offset and overrides
+_FEED_OVERRIDES = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides [%] by byte; 0x90 takes them back
+_INTEGER_SETTINGS = {1, 3, 10, 13, 20, 21, 22, 23, 32, 384}  # settings of whole numbers
 
 
 @dataclass
@@ -166,7 +166,7 @@ class Grbl(SimulatedTime):
             self._begun = _Line()
 
     def _change_feed(self, byte: int) -> None:
-        self.override = 100 if byte == 0x90 else min(max(self.override + _FEED[byte], 10), 200)
+        self.override = 100 if byte == 0x90 else min(max(self.override + _FEED_OVERRIDES[byte], 10), 200)
         self._reports = 0
 
     # Motion
@@ -209,8 +209,8 @@ class Grbl(SimulatedTime):
         if not bits & 1:
             place = [a - b for a, b in zip(place, shift, strict=True)]
         text = f"<{self._state_text()}|{'MPos' if bits & 1 else 'WPos'}:{_three_decimals(place)}"
-        text += f"|Bf:{BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" if bits & 2 else ""
-        turn, self._reports = self._reports % _SEEN, self._reports + 1
+        text += f"|Bf:{MAX_BLOCKS - len(self._blocks)},{RX_BUFFER - len(self._rx)}" if bits & 2 else ""
+        turn, self._reports = self._reports % _OFFSET_REPORT_PERIOD, self._reports + 1
         in_turn = {0: f"|Ov:{self.override},100,100", 1: f"|WCO:{_three_decimals(shift)}"}
         return f"{text}|FS:0,0{in_turn.get(turn, '')}>"
 
@@ -228,7 +228,7 @@ class Grbl(SimulatedTime):
     def _carry_out(self, line: str) -> bool:
         """Obey a whole line; False while it has to wait for the blocks before it."""
         words = self.modes.read(line)
-        waits = isinstance(words, Words) and self._blocks and (words.waits() or len(self._blocks) >= BLOCKS)
+        waits = isinstance(words, Words) and self._blocks and (words.waits() or len(self._blocks) >= MAX_BLOCKS)
         if waits or any(not block.line for block in self._blocks):
             return False
         self._whole = None
@@ -236,7 +236,7 @@ class Grbl(SimulatedTime):
         return True
 
     def _obey(self, line: str) -> None:
-        if len(line) >= _LINE and not self.hal:
+        if len(line) >= _MAX_LINE_BYTES and not self.hal:
             error = 11
         elif line.startswith("$"):
             error = self._run_system_command(line[1:])
@@ -272,7 +272,7 @@ class Grbl(SimulatedTime):
     def _set_setting(self, number: int, text: str) -> int:
         if number not in self.settings:
             return 3
-        if self.hal and number in _WHOLE and not text.lstrip("-").isdigit():
+        if self.hal and number in _INTEGER_SETTINGS and not text.lstrip("-").isdigit():
             return 52
         self.settings[number] = float(text)
         return 0
@@ -348,7 +348,7 @@ def _block_to(
 def _version_lines(hal: bool) -> list[str]:
     """The answer to ``$I``."""
     version = "[VER:1.1f.20260817:]" if hal else "[VER:1.1h.20190825:]"
-    return [version, f"[OPT:V,{BLOCKS},{RX_BUFFER}]", *["[FIRMWARE:grblHAL]"] * hal]
+    return [version, f"[OPT:V,{MAX_BLOCKS},{RX_BUFFER}]", *["[FIRMWARE:grblHAL]"] * hal]
 
 
 def _machine_position(settings: Mapping[int, float], steps: Sequence[int]) -> list[float]:
@@ -365,5 +365,5 @@ _REALTIME: dict[int, Callable[[Grbl], None]] = {  # commands of one byte, which 
     ord("!"): Grbl._hold,
     ord("~"): Grbl._resume,
     0x85: Grbl._cancel_jog,
-    **{byte: partial(Grbl._change_feed, byte=byte) for byte in _FEED},
+    **{byte: partial(Grbl._change_feed, byte=byte) for byte in _FEED_OVERRIDES},
 }

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from armkin.board.firmware.wire.protocol import Error
 from armkin.board.sim.cruise import Cruise
 
-_DEBOUNCE = 0.004  # time [s] that a switch must be closed
+_DEBOUNCE_TIME = 0.004  # time [s] that a switch must be closed
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Homing:
             self._switch_time = -1.0
         elif self._switch_time < 0:
             self._switch_time, self._switch_counts = present, list(self._cruise.axes.base)
-        steady = self._switch_time >= 0 and present - self._switch_time >= _DEBOUNCE
+        steady = self._switch_time >= 0 and present - self._switch_time >= _DEBOUNCE_TIME
         if steady:
             self.latch = self._switch_counts
         return steady

@@ -19,7 +19,7 @@ from typing import Any
 from armkin.board.sim.clock import SimulatedTime
 
 END = b"\x03"  # byte that ends a message
-AHEAD = 1.0  # motion [s] that the queue holds
+QUEUE_TIME = 1.0  # motion [s] that the queue holds
 
 
 class Refused(Exception):  # noqa: N818
@@ -164,7 +164,7 @@ class Klipper(SimulatedTime):
         """Whether a line can be run now: M400 waits for the queue, a move for room in it."""
         if line.startswith(("M400", "MANUAL_STEPPER", "M84")):
             return not self._moves
-        return sum(move.seconds - move.seconds_done for move in self._moves) <= AHEAD
+        return sum(move.seconds - move.seconds_done for move in self._moves) <= QUEUE_TIME
 
     def _obey(self, line: str) -> None:
         head, *words = line.split()

@@ -15,7 +15,7 @@ from armkin.board.sim.segment_queue import Queue
 from armkin.board.sim.sim_homing import Homing, Search
 from armkin.board.sim.sim_jogging import Jogging
 
-_STANDING = 0.001  # time [s] to a stop at which a hold stands still
+_STANDING_TIME = 0.001  # time [s] to a stop at which a hold stands still
 
 
 class Motors:
@@ -109,7 +109,7 @@ class Motors:
                 self._brake = 1.0
             self._hold -= seconds * self._brake
             plan = self.queue.stop_time()
-            if self._hold < _STANDING:
+            if self._hold < _STANDING_TIME:
                 self.cut()
             else:
                 self._run(seconds * min(1.0, self._hold / plan if plan else 1.0))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from armkin.board.feetech.packet import BROADCAST, Instruction, Splitter, packet
 from armkin.board.feetech.registers import (
-    COUNTS,
+    COUNTS_PER_TURN,
     GOAL_POSITION,
     GOAL_SPEED,
     LOAD,
@@ -25,21 +25,21 @@ from armkin.board.feetech.registers import (
 )
 from armkin.board.sim.clock import SimulatedTime
 
-PAUSE = 0.002  # time [s], at most, between the bytes of a packet
+MAX_PAUSE = 0.002  # time [s], at most, between the bytes of a packet
 MAX_SPEED = 3400  # speed [counts/s], at most, of a servo
 
 
 class Servo:
     """One servo: its registers, and a shaft that follows the goal at the goal's speed."""
 
-    def __init__(self, number: int, position: float = COUNTS / 2) -> None:
+    def __init__(self, number: int, position: float = COUNTS_PER_TURN / 2) -> None:
         self.number, self.position = number, position
         self.speed = 0.0
         self.errors = 0
         self.memory = bytearray(80)
         self.set(MODEL, 777)
         self.set(MIN_POSITION, 0)
-        self.set(MAX_POSITION, COUNTS - 1)
+        self.set(MAX_POSITION, COUNTS_PER_TURN - 1)
         self.set(VOLTAGE, 74)
         self.set(TEMPERATURE, 31)
         self.set(GOAL_POSITION, round(position))
@@ -104,7 +104,7 @@ class ServoBus(SimulatedTime):
 
     def write(self, data: bytes) -> None:
         """Send bytes to the bus; a servo forgets the beginning of a packet after a pause."""
-        if self._now - self._heard > PAUSE:
+        if self._now - self._heard > MAX_PAUSE:
             self._splitter.clear()
         self._heard = self._now
         for question in self._splitter.feed(self._spoil(data)):

@@ -54,7 +54,7 @@ def products(v: Array) -> tuple[Array, Bool, Bool]:
 
 
 def _quotient(low: Array, high: Array) -> tuple[Array, Bool]:
-    """X' (G, d, d) of high = X low for mixtures' rows (G, d, ...), turned by `_SHIFT_ANGLE`; whether X is determined."""
+    """X' (G, d, d) of high = X low for mixtures' rows (G, d, ...) turned by `_SHIFT_ANGLE`; whether X is determined."""
     shape = (*low.shape[:2], low.shape[2] * low.shape[3])
     c, s = np.cos(_SHIFT_ANGLE), np.sin(_SHIFT_ANGLE)
     below, above = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)

@@ -22,26 +22,26 @@ from armkin.board.firmware.wire.protocol import BLOCK, COARSE_UNIT, FINE_BOUND, 
 
 Counts = NDArray[np.int64]
 
-CLOCK = 16_000_000  # clock rate [1/s] of every board so far
+CLOCK_RATE = 16_000_000  # clock rate [1/s] of every board so far
 MIN_INTERVAL = 576  # interval [cycles] between ticks that every board makes
 
-_TICK, _TICK_QUICK = 1.12, 1.28  # shortest length of a tick at a segment's fast end, in intervals that the board makes
+_TICK_INTERVALS, _QUICK_TICK_INTERVALS = 1.12, 1.28  # least tick [board's intervals] at a segment's fast end
 _TICK_S = 20e-6  # length [s] of a tick, at least, unless a motor steps faster: no edge is farther off than that
 _MAX_TICK_S = 55e-6  # length [s] of a tick where a finer one would not fit the rates as well
-_ACCEL = 1.014  # factor on its acceleration that a piece has at most; above it its ends' speeds come nearer
+_ACCEL_FACTOR = 1.014  # factor on its acceleration that a piece has at most; above it its ends' speeds come nearer
 _MIN_FACTOR = 0.975  # factor, at least, on that difference of speeds: a few cycles of the interval between pieces
 _STEADY_CHANGE = 0.004  # relative change of speed that counts as none
 _EVEN_SECONDS = 0.02  # length [s] of a piece of one speed whose intervals grow bit by bit: less changes too fast
 _FINE_TICKS = 150  # ticks in which the fastest motor makes a step: more would not be smoother
-_DRIFT = 0.02  # error [steps], at most, that adds up
+_MAX_DRIFT = 0.02  # error [steps], at most, that adds up
 _WHOLE_TICKS = 8  # ticks a step, up to which a ramp's are as many for each step: a tick is felt
 _LONG_STEP = 40  # ticks a step, from where on the ticks need not fit the steps
 _MIN_TICKS = 32  # ticks of a segment, at least, where the board can make them
 _MAX_INTERVAL = 50_000  # interval [cycles], at most, of a tick; the device takes 65535
-_BENDS = 1000, 20  # ticks, at most, of a segment whose `bend` counts with each; least such bend
-_BEND = 32767  # greatest bend of a segment
-_MONOTONE = 1.98  # ratio of a parabola's slow end to its fast one, in distances from the mean: from 2 on it turns
-_CHOICE, _CHOICES = 32, 12  # ticks of a ramp of which one may be left out, for intervals of whole cycles; at most
+_BEND_TICKS, _MIN_BEND = 1000, 20  # ticks, at most, of a segment whose `bend` counts with each; least such bend
+_MAX_BEND = 32767  # greatest bend of a segment
+_MONOTONE_RATIO = 1.98  # ratio of a parabola's slow end to its fast one, in distances from the mean: from 2 on it turns
+_CHOICE_TICKS, _MAX_CHOICES = 32, 12  # ticks of a ramp of which one may go, for whole cycles; at most
 _MAX_TICKS = 16_000  # ticks, at most, of a segment: as many as a rate is exact for to a quarter of a step
 
 
@@ -84,7 +84,7 @@ def cycles_of(segment: Segment) -> int:
 class Cutter:
     """Cuts a motion from rest: where every motor is, to 2^-23 step, and what rounding has done to the time."""
 
-    def __init__(self, start: Sequence[int], clock: int = CLOCK, min_interval: int = MIN_INTERVAL) -> None:
+    def __init__(self, start: Sequence[int], clock: int = CLOCK_RATE, min_interval: int = MIN_INTERVAL) -> None:
         self.clock, self.min_interval = clock, min_interval
         self.places = [int(count) * STEP + HALF for count in start]
         self._aims = list(self.places)  # where the motors should be
@@ -95,7 +95,7 @@ class Cutter:
         seconds: float,
         counts: Sequence[float],
         change: float = 0.0,
-        drift: float = _DRIFT,
+        drift: float = _MAX_DRIFT,
         make_up: float | None = None,
         unheard: bool = False,
     ) -> Segment:
@@ -156,22 +156,22 @@ class Cutter:
         """A piece whose speed changes evenly, see `piece`: as many ticks as the board makes, as `bend` has 16 bits."""
         fast = (1 + abs(change) / 2) * self.min_interval
         shortest = exact / (16 * change**2 * exact) ** (1 / 3)  # [cycles] of a tick, for the quick bend to have 16 bits
-        ticks = int(exact / max(_TICK_QUICK * fast, min(_TICK_S * self.clock, shortest)))
-        quick = (
-            steps <= ticks <= _BENDS[0] and ticks > 1 and abs(_fit_parabola(exact, ticks, change, True)[2]) >= _BENDS[1]
-        )
+        ticks = int(exact / max(_QUICK_TICK_INTERVALS * fast, min(_TICK_S * self.clock, shortest)))
+        bend = abs(_fit_parabola(exact, ticks, change, True)[2]) if ticks > 1 and steps <= ticks <= _BEND_TICKS else 0
+        quick = bend >= _MIN_BEND
         if not quick:
-            fewer, ticks = ticks, int(exact / max(_TICK * fast, _TICK_S * self.clock, exact / _MAX_TICKS))
-            if ticks > 1 and steps <= _BENDS[0] < fewer and abs(_fit_parabola(exact, ticks, change, False)[2]) == _BEND:
-                quick, ticks = True, _BENDS[0]  # else it would end faster than the board loads the next one
+            fewer, ticks = ticks, int(exact / max(_TICK_INTERVALS * fast, _TICK_S * self.clock, exact / _MAX_TICKS))
+            is_few = ticks > 1 and steps <= _BEND_TICKS < fewer
+            if is_few and abs(_fit_parabola(exact, ticks, change, False)[2]) == _MAX_BEND:
+                quick, ticks = True, _BEND_TICKS  # else it would end faster than the board loads the next one
         ticks = max(1, ticks, math.ceil(steps), math.ceil(exact / _MAX_INTERVAL))
         ratio = (2 + abs(change)) / (2 - abs(change))
         above = 0.53 * (ratio - 1) ** 2 + (0 if quick else 1.5 * BLOCK / ticks * abs(change))
-        change *= max(_MIN_FACTOR, min(1.0, _ACCEL / (1 + above)))
+        change *= max(_MIN_FACTOR, min(1.0, _ACCEL_FACTOR / (1 + above)))
         if steps >= 4 and (over := int(ticks / steps)) <= _WHOLE_TICKS:
             ticks = max(round(over * steps), math.ceil(steps))
-        elif ticks > _CHOICE:
-            spread = range(ticks - min(ticks // _CHOICE, _CHOICES), ticks + 1)
+        elif ticks > _CHOICE_TICKS:
+            spread = range(ticks - min(ticks // _CHOICE_TICKS, _MAX_CHOICES), ticks + 1)
             ticks = min(spread, key=lambda t: _fit_parabola(exact, t, change, quick)[3])
         interval, add, bend, _ = _fit_parabola(exact, ticks, change, quick)
         segment = Segment(ticks, interval, add, _rounded_rates(remainders, ticks), bend, quick and bend != 0)
@@ -180,7 +180,7 @@ class Cutter:
 
     def _tick_count(self, cycles: float, steps: float) -> int:
         """How many ticks a piece of one speed has: whole ones for each step of its fastest motor, if it makes many."""
-        least = max(_TICK * self.min_interval, _TICK_S * self.clock)
+        least = max(_TICK_INTERVALS * self.min_interval, _TICK_S * self.clock)
         step_cycles = cycles / steps if steps > 1e-9 else math.inf  # cycles a step
         tick = max(least, min(step_cycles / _FINE_TICKS, cycles / _MIN_TICKS, _MAX_INTERVAL / 2), cycles / _MAX_TICKS)
         over = int(step_cycles / tick) if step_cycles < math.inf else 0
@@ -237,13 +237,13 @@ def _fit_parabola(exact: float, ticks: int, change: float, quick: bool) -> tuple
     """
     mean = exact / ticks
     fast, slow = mean / (1 + abs(change) / 2), mean / (1 - abs(change) / 2)  # intervals at its ends
-    slow = min(slow, mean + _MONOTONE * (mean - fast))
+    slow = min(slow, mean + _MONOTONE_RATIO * (mean - fast))
     a, b = (slow, fast) if change > 0 else (fast, slow)
     curve = 3 * (a + b) - 6 * mean
     span = (b - a) * (ticks - 1) / ticks  # span from the first interval's middle to the last one's
     unit, block = (17, 1) if quick else (22, BLOCK)
     exact_bend = 2 * curve / ticks**2 * block * 2**unit
-    bend = max(-_BEND, min(_BEND, round(exact_bend)))
+    bend = max(-_MAX_BEND, min(_MAX_BEND, round(exact_bend)))
     add = (span - bend * _bend_count(ticks, quick) / 2**unit) / max(ticks - 1, 1) * 65536
     if (bend and add * (add + bend * ((ticks - 1) // block) / 2 ** (unit - 16)) <= 0) or abs(add) < 0.5:
         bend, add = 0, span / max(ticks - 1, 1) * 65536

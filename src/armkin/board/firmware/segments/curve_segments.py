@@ -25,12 +25,12 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch
 
 _MIN_SECONDS, _MAX_SECONDS = 0.010, 0.050  # length [s] of a segment, at least and at most
-_GROWTH = 0.12  # length of a segment, at most, as a share of the time since the start, or to the end
+_GROWTH_SHARE = 0.12  # length of a segment, at most, as a share of the time since the start, or to the end
 _SAMPLE_PERIOD = 0.005  # time [s] between the samples from which the spans are chosen
-_QUEUED = 25  # segments that are surely in the board's queue
-_SETTLING = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
-_JUMP = 1.1  # factor on the motors' accelerations that a segment has at most
-_SAMPLES = 20_000  # samples looked at at once
+_QUEUED_SEGMENTS = 25  # segments that are surely in the board's queue
+_SETTLING_SHARE = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
+_JUMP_FACTOR = 1.1  # factor on the motors' accelerations that a segment has at most
+_CHUNK_SAMPLES = 20_000  # samples looked at at once
 _BLOCK_SEGMENTS = 512  # segments made at once
 
 
@@ -76,13 +76,13 @@ class CurveSegments:
         """Where the motors are at times t, fractions included: (T, motors).
 
         Both ends are whole counts; what rounding them has moved, half a step at most, is left behind as fast as
-        _SETTLING of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
+        _SETTLING_SHARE of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
         """
         duration = self.stretch.duration
         ends = exact_pulses(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
         counts = exact_pulses(self.arm, self.stretch.evaluate(t))
         for offset, since in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
-            span = np.sqrt(6 * np.abs(offset) / (_SETTLING * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6 at most
+            span = np.sqrt(6 * np.abs(offset) / (_SETTLING_SHARE * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6
             f = np.clip(since[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
             counts = counts + offset * (1 - f * f * (3 - 2 * f))
         return np.asarray(counts)
@@ -97,7 +97,7 @@ class CurveSegments:
         end_time: the longer time of each two. Without a ramp a segment always fits: its mean follows the one before
         within the greatest acceleration.
         """
-        most = _JUMP * motor_accel(self.arm)
+        most = _JUMP_FACTOR * motor_accel(self.arm)
         state = list(cutter.places), cutter.late
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             cutter.places, cutter.late = list(state[0]), state[1]
@@ -126,7 +126,7 @@ class CurveSegments:
         speed = np.linalg.norm(self.stretch.evaluate(t, 1) @ gain, axis=1).tolist()
         change = np.array([speed_change(a, b) for a, b in pairwise(speed)])
         h = np.diff(t)[:, None]
-        most = _JUMP * motor_accel(self.arm)
+        most = _JUMP_FACTOR * motor_accel(self.arm)
         ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration
         size = np.maximum(np.abs(ramp), 1e-12)
         share = np.minimum((most / size).min(axis=1), 1.0)
@@ -160,9 +160,9 @@ class CurveSegments:
         duration, step = self.stretch.duration, float(t[1])
         density, first = np.empty(len(t)), 0
         behind = np.zeros(0)  # times to a stop just before a part, as many as may reach into it
-        for part in np.array_split(t, max(len(t) // _SAMPLES, 1)):
+        for part in np.array_split(t, max(len(t) // _CHUNK_SAMPLES, 1)):
             span, stop = self._span_limits(part)
-            span = np.minimum(span, _GROWTH * np.minimum(part, duration - part))
+            span = np.minimum(span, _GROWTH_SHARE * np.minimum(part, duration - part))
             stop_times = np.concatenate([behind, stop])
             span = np.maximum(np.clip(span, _MIN_SECONDS, _MAX_SECONDS), _least_spans(stop_times, step)[len(behind) :])
             density[first : first + len(part)] = 1.0 / span
@@ -190,11 +190,11 @@ class CurveSegments:
 
 
 def _least_spans(stop: Array, step: float) -> Array:
-    """Least span of segments so that `_QUEUED` of them always reach to a stop; samples `step` [s] apart.
+    """Least span of segments so that `_QUEUED_SEGMENTS` of them always reach to a stop; samples `step` [s] apart.
 
     What moves now and needs u to a stop asks that of all segments within the next u.
     """
-    need = stop / _QUEUED
+    need = stop / _QUEUED_SEGMENTS
     least = need.copy()
     if float(need.max(initial=0.0)) <= _MIN_SECONDS:  # no segment is shorter
         return least
@@ -206,7 +206,7 @@ def _least_spans(stop: Array, step: float) -> Array:
 def sampled_rates(arm: Arm, stretch: Stretch) -> Array:
     """Greatest rate of every motor: (motors,) [counts/s], sampled every 5 ms."""
     t = np.linspace(0.0, stretch.duration, max(int(stretch.duration / _SAMPLE_PERIOD), 16))
-    parts = np.array_split(t, max(len(t) // _SAMPLES, 1))
+    parts = np.array_split(t, max(len(t) // _CHUNK_SAMPLES, 1))
     return np.asarray(
         np.max([np.abs(stretch.evaluate(part, 1) @ arm.motor_gain.T).max(axis=0) for part in parts], axis=0)
     )

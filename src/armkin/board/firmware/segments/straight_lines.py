@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.firmware.segments.counts_to_segments import (
-    CLOCK,
+    CLOCK_RATE,
     MIN_INTERVAL,
     Counts,
     Cutter,
@@ -29,22 +29,22 @@ from armkin.motion.timing.profile import Profile, trapezoid
 
 # A ramp's segments have one ratio of speeds, their fast end's over their slow end's: the acceleration within is right
 # to 0.53 (ratio - 1)^2, 1.5 % at 1.17. All of a ramp fits into the board's queue (32).
-_RATIO = 1.14  # ratio of speeds of a segment in a ramp with fewer segments than `_RAMP`
-_RAMP, _SHORT_RAMP, _ROUGH_RAMP = 27, 13, 12  # segments of a ramp at most, see `Pieces`
+_SPEED_RATIO = 1.14  # ratio of speeds of a segment in a ramp with fewer segments than `_RAMP_SEGMENTS`
+_RAMP_SEGMENTS, _SHORT_RAMP_SEGMENTS, _ROUGH_RAMP_SEGMENTS = 27, 13, 12  # segments of a ramp at most, see `Pieces`
 _MAX_RATIO = 1.4  # ratio of speeds from which the first segment gets longer: the board takes 5/4 of the acceleration
-_FIRST, _FIRST_ROUGH = 0.003, 0.03  # length [s], at least, of a ramp's first segment; in rough, four times any other
+_FIRST_TIME, _ROUGH_FIRST_TIME = 0.003, 0.03  # least length [s] of a ramp's first segment; in rough, 4 times any other
 _FIRST_MAX = 0.1  # length [s], at most, of a ramp's first segment: a board's jump is 5/4 of the acceleration in 50 ms
 _BEFORE_STEP = 0.96  # share of the time to a motor's first step: until then no motor tells how it got there
 _NO_STEP = 0.49  # part of a step that is left for the rounding of rates
 # Of its time, that such a first segment takes, at once at the speed that 1.2 of the acceleration makes in it; the
 # board's bound is 5/4. All edges come so much sooner, as far from one another as in the time law.
-UNHEARD = math.sqrt(1 / 2.4)  # share of its time
-_CRUISE = (0.2, 0.4)  # length [s] of a cruise segment, least and greatest
-_JERK = 0.02  # length [s] of a segment in which the acceleration changes
-_SPLIT = 0.08  # length [s] of a cruise segment whose end is one of its own
-_NONE = (0.03, 0.0006)  # length of a cruise, as a share of a ramp or in [s], below which it belongs to the ramps
+UNHEARD_SHARE = math.sqrt(1 / 2.4)  # share of its time
+_CRUISE_TIMES = (0.2, 0.4)  # length [s] of a cruise segment, least and greatest
+_JERK_TIME = 0.02  # length [s] of a segment in which the acceleration changes
+_SPLIT_TIME = 0.08  # length [s] of a cruise segment whose end is one of its own
+_MIN_CRUISE = (0.03, 0.0006)  # length of a cruise, as a share of a ramp or in [s], below which it belongs to the ramps
 _MAKE_UP = 0.01  # share of its way in a piece that a motor makes up for: the board takes 1.05 of its rate
-_SPARE = 0.0005  # share of a piece's steps that is left for the next one to make up for
+_SPARE_SHARE = 0.0005  # share of a piece's steps that is left for the next one to make up for
 _EAGER_SEGMENTS = 2000  # segments of a line that are made at once
 _AT_ONCE = 512  # bounds of segments that are held, of a longer line
 
@@ -62,7 +62,7 @@ def line_segments(
     end: Sequence[int],
     law: Profile,
     *,
-    clock: int = CLOCK,
+    clock: int = CLOCK_RATE,
     min_interval: int = MIN_INTERVAL,
     pieces: Pieces = Pieces.FINE,
 ) -> Move:
@@ -103,10 +103,10 @@ class LineSegments:
             for k, (a, b) in enumerate(pairwise(times.tolist())):
                 change = speed_change(float(speed[k]), float(speed[k + 1]))
                 counts = (self.start + span * share[k + 1]).tolist()
-                drift = _SPARE * steps * float(share[k + 1] - share[k])
+                drift = _SPARE_SHARE * steps * float(share[k + 1] - share[k])
                 last = ending and k + 2 == len(times)
                 unheard = unheard and float(share[k + 1]) * steps < _NO_STEP
-                seconds = (b - a) * (UNHEARD if unheard else 1.0)
+                seconds = (b - a) * (UNHEARD_SHARE if unheard else 1.0)
                 yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP, unheard)
                 unheard = False
         if [p // STEP for p in cutter.places] != self.end.tolist():
@@ -132,7 +132,7 @@ def straight_line(
     top: float,
     accel: float,
     *,
-    clock: int = CLOCK,
+    clock: int = CLOCK_RATE,
     min_interval: int = MIN_INTERVAL,
 ) -> Move:
     """A straight line in counts from rest to rest: `top` [1/s] and `accel` [1/s^2] at most, both in lines."""
@@ -142,9 +142,9 @@ def straight_line(
 def _most_ramp_segments(law: Profile, pieces: Pieces) -> int:
     """Segments of a ramp at most; a move is short if its cruise is shorter than a ramp."""
     if pieces == Pieces.ROUGH:
-        return _ROUGH_RAMP
+        return _ROUGH_RAMP_SEGMENTS
     short = law.is_trapezoid and law.duration < 3 * law.peak / law.accel
-    return _SHORT_RAMP if short and pieces == Pieces.FEW else _RAMP
+    return _SHORT_RAMP_SEGMENTS if short and pieces == Pieces.FEW else _RAMP_SEGMENTS
 
 
 def _to_first_step(law: Profile, accel: float, steps: int) -> float:
@@ -159,7 +159,7 @@ def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[floa
     """
     ramp = law.peak / max(law.accel, 1e-12)
     times = law.times.tolist()
-    if law.is_trapezoid and times[2] - times[1] < max(_NONE[0] * ramp, _NONE[1]):
+    if law.is_trapezoid and times[2] - times[1] < max(_MIN_CRUISE[0] * ramp, _MIN_CRUISE[1]):
         times[1] = times[2] = (times[1] + times[2]) / 2
     for k, (t0, t1) in enumerate(pairwise(times)):
         accel, jerk = float(law.states[k, 2]), float(law.jerk[k])
@@ -168,10 +168,10 @@ def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[floa
         if jerk == 0.0 and accel != 0.0:
             yield t0, t1, _ramp_bounds(law, t0, t1, accel, steps, pieces)
             continue
-        longest = _JERK if jerk else min(max(ramp / 8, _CRUISE[0]), _CRUISE[1])
+        longest = _JERK_TIME if jerk else min(max(ramp / 8, _CRUISE_TIMES[0]), _CRUISE_TIMES[1])
         parts = math.ceil((t1 - t0) / longest)
         part_time = (t1 - t0) / parts
-        if jerk or part_time < _SPLIT:
+        if jerk or part_time < _SPLIT_TIME:
             yield t0, t1, parts
             continue
         if parts > 1:
@@ -192,13 +192,13 @@ def _ramp_bounds(law: Profile, t0: float, t1: float, accel: float, steps: int, p
     v0, v1 = (float(v) for v in law.evaluate(np.array([t0, t1]), 1))
     if accel < 0:
         v1 = max(0.0, v0 + accel * (t1 - t0))
-    most, shortest = _most_ramp_segments(law, pieces), _FIRST_ROUGH if pieces == Pieces.ROUGH else _FIRST
+    most, shortest = _most_ramp_segments(law, pieces), _ROUGH_FIRST_TIME if pieces == Pieces.ROUGH else _FIRST_TIME
     top = max(v0, v1) / abs(accel)  # [s] from rest at each speed
     first = max(min(v0, v1) / abs(accel), shortest, _to_first_step(law, accel, steps))
     first = min(max(first, top / _MAX_RATIO**most), _FIRST_MAX)
     to_rest = [top]
     if top > first:
-        number = min(most, math.ceil(math.log(top / first) / math.log(_RATIO)))
+        number = min(most, math.ceil(math.log(top / first) / math.log(_SPEED_RATIO)))
         ratio = (top / first) ** (1 / number)
         while (slower := min(to_rest[-1] / ratio, to_rest[-1] - shortest / 4)) > first * 1.02:
             to_rest.append(slower)

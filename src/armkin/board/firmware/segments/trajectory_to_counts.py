@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.backend.motion_start import StartedTrajectory
-from armkin.board.firmware.segments.counts_to_segments import CLOCK, MIN_INTERVAL, Counts, Move
+from armkin.board.firmware.segments.counts_to_segments import CLOCK_RATE, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.segments.curve_segments import CurveSegments, sampled_rates
 from armkin.board.firmware.segments.straight_lines import Pieces, line_segments, segment_count
 from armkin.errors import UsageError
@@ -96,7 +96,7 @@ class Cut(StartedTrajectory):
 
 
 def cut_trajectory(
-    trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK, min_interval: int = MIN_INTERVAL
+    trajectory: Trajectory, start: ArrayLike, *, clock: int = CLOCK_RATE, min_interval: int = MIN_INTERVAL
 ) -> Cut:
     """A trajectory that starts at counts `start` (motors,), for a board of this clock and shortest interval.
 
@@ -125,7 +125,7 @@ def plan_moves(
     targets: ArrayLike,
     *,
     speed: float = 1.0,
-    clock: int = CLOCK,
+    clock: int = CLOCK_RATE,
     min_interval: int = MIN_INTERVAL,
 ) -> Cut:
     """Moves from counts through joint targets, stopping at each, where the motors' steps put them.
