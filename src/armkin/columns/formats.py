@@ -15,7 +15,10 @@ Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the oth
 
 @dataclass(frozen=True)
 class Format:
-    """encoded: a chunk's bytes; of text, `lines` may say what prints them. together: writes the file of all chunks."""
+    """A format of files of rows.
+
+    encoded: a chunk's bytes; of text, its parameter `lines` may print them. write_parts: writes the file of all chunks.
+    """
 
     name: str
     encoded: Callable[..., bytes]

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ProgramActions:
-    """One program that all pages show; `tell` hears it whenever it changes."""
+    """One program that all pages show; `publish` is given it whenever it changes."""
 
     def __init__(
         self, arm: Arm, standing_pulses: Callable[[], tuple[int, ...] | None], publish: Callable[[dict[str, Any]], None]

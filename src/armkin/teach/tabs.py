@@ -45,7 +45,7 @@ Action = Callable[[Tab, Fields], dict[str, Any]]  # what a page asks for -> what
 
 
 class Tabs:
-    """All open pages; `left` is called when the page that holds control goes."""
+    """All open pages; `on_leave` is called when the page that holds control goes."""
 
     def __init__(self, on_leave: Callable[[], None] = lambda: None) -> None:
         self._lock = threading.RLock()

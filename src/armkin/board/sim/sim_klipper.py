@@ -228,7 +228,7 @@ class Klipper(SimulatedTime):
         self._move({word[0]: float(word[1:]) for word in words})
 
     def _wait(self, words: list[str]) -> None:
-        """M400 is reached when the queue is empty (`_room`)."""
+        """M400 is run when the queue is empty: see `_has_room`."""
 
     def _move(self, words: dict[str, float]) -> None:
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed

@@ -1,6 +1,6 @@
 """Payloads to bytes on the line and back (firmware/PROTOCOL.md, section 1).
 
-payload  --wire()-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
+payload  --encode_frame-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class Splitter:
         self._skip = False  # the frame is too long already
 
     def feed(self, received: bytes) -> Iterator[bytes]:
-        """The payloads that `data` completes."""
+        """The payloads that `received` completes."""
         *frames, incomplete = received.split(b"\0")
         for frame in frames:
             stuffed = bytes(self._incomplete) + frame
