@@ -15,7 +15,7 @@ import pytest
 
 import armkin
 from armkin.cli.csv_to_numbers import batch_rows
-from armkin.cli.row_chunks import ROWS, Chunk
+from armkin.cli.row_chunks import CHUNK_ROWS, Chunk
 from armkin.errors import UsageError
 from command_line import ROOT, THREE_DOF, run
 
@@ -207,7 +207,7 @@ def test_out_follows_a_link(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.cli.csv_to_numbers.ROWS", 2000)
+    monkeypatch.setattr("armkin.cli.csv_to_numbers.CHUNK_ROWS", 2000)
 
     def peak(count: int) -> int:
         path = tmp_path / "in.csv"
@@ -224,11 +224,11 @@ def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.
 
 def test_rows_are_read_as_they_are_needed(tmp_path: Path) -> None:
     path = tmp_path / "in.csv"
-    path.write_bytes(b"1,2\n" * (ROWS + 5000) + b"bad\n")
+    path.write_bytes(b"1,2\n" * (CHUNK_ROWS + 5000) + b"bad\n")
     chunks = batch_rows(str(path), ["a", "b"], "test")
-    assert len(next(chunks).values) == ROWS
-    assert next(chunks).numbers[-1] == ROWS + 5000
-    with pytest.raises(UsageError, match=rf"in\.csv: row {ROWS + 5001}"):
+    assert len(next(chunks).values) == CHUNK_ROWS
+    assert next(chunks).numbers[-1] == CHUNK_ROWS + 5000
+    with pytest.raises(UsageError, match=rf"in\.csv: row {CHUNK_ROWS + 5001}"):
         next(chunks)
 
 

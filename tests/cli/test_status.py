@@ -56,7 +56,7 @@ def test_watch_tells_each_change_once_and_ends_with_ctrl_c(monkeypatch: pytest.M
     board = SimBoard(BOARDS["uno_cnc_shield"])
     plug_in(board, monkeypatch)
     assert run("send", THREE_DOF, 10, 80, -80, "--port", "COM3", "--assume-home").code == 0
-    monkeypatch.setattr("armkin.cli.commands.status._EVERY", 0.001)
+    monkeypatch.setattr("armkin.cli.commands.status._READ_PERIOD", 0.001)
     count = 0
 
     def refresh(machine: FirmwareMachine) -> None:

@@ -99,7 +99,7 @@ def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> Non
 @pytest.fixture
 def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A batch of ten pieces for three_dof; some rows have no branch within limits."""
-    monkeypatch.setattr(csv_to_numbers, "ROWS", 30)
+    monkeypatch.setattr(csv_to_numbers, "CHUNK_ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
     path = tmp_path / "in.csv"
     path.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")

@@ -75,7 +75,7 @@ def test_a_killed_command_leaves_no_process(tmp_path: Path) -> None:
 
 
 def test_a_batch_is_the_same_bytes_on_a_cluster(address: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(csv_to_numbers, "ROWS", 30)
+    monkeypatch.setattr(csv_to_numbers, "CHUNK_ROWS", 30)
     values = np.random.default_rng(2).uniform(-420, 420, (290, 3)).round(3)
     rows, alone, two = tmp_path / "in.csv", tmp_path / "one.csv", tmp_path / "two.csv"
     rows.write_text("x,y,z\n" + "\n".join(",".join(map(str, row)) for row in values.tolist()) + "\n")

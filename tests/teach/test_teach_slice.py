@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.reachability import voxels
 from armkin.reachability.reach_cells import Grid
 from armkin.teach.actions import Actions
-from armkin.teach.reach_slice import DIRECTIONS, VALUES, VOXELS_ACROSS, reach_slice
+from armkin.teach.reach_slice import DIRECTION_COUNT, VALUE_COUNT, VOXELS_ACROSS, reach_slice
 
 
 def test_voxels_are_shown_and_hidden_again(browser: Browser) -> None:
@@ -32,17 +32,17 @@ def test_a_voxel_says_what_ik_says_of_its_centre() -> None:
     answer = reach_slice(arm)
     centres = np.reshape(answer["centres"], (-1, 3))
     assert answer["size"] == pytest.approx(arm.reach / VOXELS_ACROSS)
-    assert answer["of"] == DIRECTIONS
+    assert answer["of"] == DIRECTION_COUNT
     assert len(centres) == len(answer["shares"]) > 20
     assert (centres[:, 1] == 0).all()
     F = np.array(answer["frame"])
     for i in (0, len(centres) // 2, len(centres) - 1):
         back = centres[i, 0] < 0
         turned = np.diag([-1.0, -1.0, 1.0]) if back else np.eye(3)  # the cell's own frame: x outwards
-        n = np.arange(DIRECTIONS)
-        z = 1 - (2 * n + 1) / DIRECTIONS
+        n = np.arange(DIRECTION_COUNT)
+        z = 1 - (2 * n + 1) / DIRECTION_COUNT
         away = np.stack([np.sqrt(1 - z**2) * f(n * np.pi * (3 - np.sqrt(5))) for f in (np.cos, np.sin)] + [z], axis=1)
-        T = np.tile(np.eye(4), (DIRECTIONS, 1, 1))
+        T = np.tile(np.eye(4), (DIRECTION_COUNT, 1, 1))
         for goal, direction in zip(T, away, strict=True):
             x = np.cross(direction, [0.3, 0.5, 0.1])  # the roll is free: joint 6 turns all round
             x /= np.linalg.norm(x)
@@ -56,14 +56,14 @@ def test_of_seven_joints_one_of_some_values_must_reach_and_no_task_is_told(monke
     monkeypatch.setattr("armkin.teach.reach_slice.VOXELS_ACROSS", 4)
     arm = armkin.load("iiwa7")
     answer = reach_slice(arm)
-    assert (answer["held"], answer["values"]) == ("J7", VALUES)
-    grid = Grid(arm, arm.reach / 4, 2, DIRECTIONS, 1, False)
+    assert (answer["held"], answer["values"]) == ("J7", VALUE_COUNT)
+    grid = Grid(arm, arm.reach / 4, 2, DIRECTION_COUNT, 1, False)
     row = voxels.section_layer(grid).row
     total = 0.0
     for k in row[:: len(row) // 4].tolist():
-        rings = np.repeat(grid.rings[[k // 2]], DIRECTIONS, axis=0)
-        away = np.full(DIRECTIONS, k % 2 * np.pi)
-        T = grid.targets(rings, away, np.arange(DIRECTIONS), np.zeros(DIRECTIONS))
+        rings = np.repeat(grid.rings[[k // 2]], DIRECTION_COUNT, axis=0)
+        away = np.full(DIRECTION_COUNT, k % 2 * np.pi)
+        T = grid.targets(rings, away, np.arange(DIRECTION_COUNT), np.zeros(DIRECTION_COUNT))
         exact = (armkin.ik(arm, T).best >= 0).mean()  # at any value
         centre = np.linalg.inv(grid.frame)[:3] @ T[0, :, 3]
         apart = np.linalg.norm(np.reshape(answer["centres"], (-1, 3)) - centre, axis=1)

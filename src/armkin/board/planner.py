@@ -14,7 +14,7 @@ from armkin.board.json_summaries import Summary, Where
 from armkin.errors import ArmkinError, NoSolutionError, UsageError
 from armkin.forward import fk
 from armkin.model import units
-from armkin.motion.path_planner.path_request import HOLD
+from armkin.motion.path_planner.path_request import HOLD_FACTOR
 from armkin.motion.rounded_waypoints import round_waypoints
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motors import joints, motor_names, pulse_units, pulses
@@ -46,7 +46,7 @@ class Planner:
         if not self.blend:
             return self.board.plan(start, q, self.speed)
         counts = np.asarray(start, dtype=np.int64)
-        way = round_waypoints(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD)
+        way = round_waypoints(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD_FACTOR)
         return self.board.lay(way, counts)
 
     def sum_up(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:

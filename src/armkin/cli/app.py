@@ -19,7 +19,7 @@ from armkin.cli.commands import COMMANDS
 from armkin.cli.negative_numbers import options_first
 from armkin.signals import put_off
 
-_INTERRUPTED = 130  # exit code after Ctrl-C
+_INTERRUPT_CODE = 130  # exit code after Ctrl-C
 _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
@@ -146,7 +146,7 @@ def _exit_code(command: Callable[[], Any]) -> int:
         return int(command() or 0)
     except (KeyboardInterrupt, typer.Abort):
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C while the first one tidies up
-        return _INTERRUPTED
+        return _INTERRUPT_CODE
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 1
     except Exception as error:

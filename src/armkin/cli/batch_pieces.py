@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from armkin import files
 from armkin.cli import csv_to_numbers
 from armkin.cli.csv_to_numbers import Columns
-from armkin.cli.number_parsing import LIMIT
+from armkin.cli.number_parsing import MAX_NUMBER
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
 
@@ -83,7 +83,7 @@ class Rows:
         read = reader_of(self.source)
         if read is None:
             return self._of_text(self.source)
-        return self._of_values(read(self.source, self.names, csv_to_numbers.ROWS))
+        return self._of_values(read(self.source, self.names, csv_to_numbers.CHUNK_ROWS))
 
     def empty(self, skipped: int) -> ArmkinError:
         """The error of an input without rows."""
@@ -130,7 +130,7 @@ def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
 
     first, absent = piece.first, np.isnan(values)
     keep = np.asarray(~absent.all(axis=1))
-    bad = np.argwhere(~(np.abs(values) <= LIMIT) & keep[:, None])
+    bad = np.argwhere(~(np.abs(values) <= MAX_NUMBER) & keep[:, None])
     end = int(bad[0, 0]) if len(bad) else len(values)
     present = np.flatnonzero(keep[:end])
     if len(present):
@@ -141,5 +141,6 @@ def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
     if len(bad):
         row, column = bad[0].tolist()
         value = values[row, column]
-        why = "a number is missing" if np.isnan(value) else f"{value:g} is too large; numbers here go up to {LIMIT:g}"
+        large = f"{value:g} is too large; numbers here go up to {MAX_NUMBER:g}"
+        why = "a number is missing" if np.isnan(value) else large
         raise UsageError(f"{piece.source}: row {first + row}: {piece.names[column]}: {why}", row=first + row)

@@ -14,8 +14,8 @@ from typing import IO, TYPE_CHECKING
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.number_parsing import LIMIT, numbers
-from armkin.cli.row_chunks import ROWS as ROWS
+from armkin.cli.number_parsing import MAX_NUMBER, numbers
+from armkin.cli.row_chunks import CHUNK_ROWS as CHUNK_ROWS
 from armkin.cli.row_chunks import Chunk
 from armkin.errors import FileError, UsageError
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
 MAX_LINE = 100_000  # characters of a line, at most: what is longer is no CSV file
-SIZE = 1 << 18  # characters read at once
+CHUNK_CHARACTERS = 1 << 18  # characters read at once
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 
@@ -99,7 +99,7 @@ class Columns:
             values = _among_others([line.split(b",") for line in lines], width, self.places)
         else:
             return None
-        return values if values is not None and np.abs(values).max() <= LIMIT else None
+        return values if values is not None and np.abs(values).max() <= MAX_NUMBER else None
 
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
@@ -250,15 +250,15 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
 
 
 def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
-    """The text in blocks of ROWS lines, each as soon as it can be read; a line of MAX_LINE characters ends it."""
+    """The text in blocks of CHUNK_ROWS lines, each as soon as it can be read; a line of MAX_LINE characters ends it."""
     held: list[bytes] = []
     lines = open_ = 0  # lines that end in what is held, and characters behind them
     while text := _read_available(file, source):
         ends = text.count(b"\n")
-        while lines + ends >= ROWS:
-            cut = _end_of_lines(text, ROWS - lines)
+        while lines + ends >= CHUNK_ROWS:
+            cut = _end_of_lines(text, CHUNK_ROWS - lines)
             yield b"".join([*held, text[:cut]])
-            text, ends, held = text[cut:], ends - (ROWS - lines), []
+            text, ends, held = text[cut:], ends - (CHUNK_ROWS - lines), []
             lines = open_ = 0
         held.append(text)
         lines, open_ = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_ + len(text)
@@ -271,7 +271,7 @@ def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
 def _read_available(file: IO[bytes], source: str) -> bytes:
     """What can be read now; nothing at the end."""
     try:
-        return bytes(file.read1(SIZE))  # type: ignore[attr-defined]
+        return bytes(file.read1(CHUNK_CHARACTERS))  # type: ignore[attr-defined]
     except (OSError, ValueError) as error:  # ValueError: closed
         raise _read_error(source, error) from None
 

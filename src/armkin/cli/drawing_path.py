@@ -8,7 +8,7 @@ import typer
 
 from armkin import files
 from armkin.cli import output
-from armkin.cli.number_parsing import LIMIT, number, place_numbers
+from armkin.cli.number_parsing import MAX_NUMBER, number, place_numbers
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
@@ -55,8 +55,8 @@ def drawing_moves(
         raise UsageError(f"--grip-by: '{grip_by}' is neither M3 nor M106")
     zero = place_numbers(at, "--at")
     factor = 1.0 if scale is None else _bounded_number(scale, "--scale", (1e-6, 1e6), "from 1e-6 to 1e6")
-    speed = None if feed is None else _bounded_number(feed, "--feed", (1e-3, LIMIT), "at least 0.001")
-    height = 5.0 if lift is None else _bounded_number(lift, "--lift", (0.0, LIMIT), "at least 0")
+    speed = None if feed is None else _bounded_number(feed, "--feed", (1e-3, MAX_NUMBER), "at least 0.001")
+    height = 5.0 if lift is None else _bounded_number(lift, "--lift", (0.0, MAX_NUMBER), "at least 0")
     files.protect_input(file)
     made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
     for text in made.notes:

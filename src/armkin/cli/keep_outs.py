@@ -23,7 +23,7 @@ NoScene = Annotated[
     bool,
     typer.Option("--no-scene", help="Forget the scene that this port was last used with."),
 ]
-_SHOWN = 4001  # postures of a motion in which hits that are ignored are looked for
+_POSTURE_COUNT = 4001  # postures of a motion in which hits that are ignored are looked for
 
 
 def load_moving_arm(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
@@ -89,7 +89,8 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
         if not trajectory.arm.keep_out or not trajectory.arm.ignores_keep_out:
             return
         held = guard(trajectory.arm)
-        apart = held.clearances(trajectory.q(np.linspace(0.0, trajectory.duration, _SHOWN))).min(axis=0, initial=np.inf)
+        t = np.linspace(0.0, trajectory.duration, _POSTURE_COUNT)
+        apart = held.clearances(trajectory.q(t)).min(axis=0, initial=np.inf)
         for k in np.flatnonzero(apart < 0).tolist():
             deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-apart[k]))
     if deepest:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from armkin.errors import UsageError
 
 # Far beyond any arm, in degrees or mm: what is larger is a slip, and would drown in rounding.
-LIMIT = 1e9
+MAX_NUMBER = 1e9
 NOT_FINITE = ("nan", "inf", "infinity")
 
 _PI = r"([+-]?)([0-9]{0,9}(?:\.[0-9]{1,9})?)\*?(?:pi|\u03c0)(?:/([0-9]{1,9}))?"
@@ -14,7 +14,7 @@ _NUMBER = re.compile(r"[+-]?(?:[0-9]++(?:\.[0-9]*+)?|\.[0-9]++)(?:[eE][+-]?[0-9]
 _MAX_DIGITS = 10_000  # characters of a number, at most
 
 
-def number(text: str, name: str, largest: float = LIMIT) -> float:
+def number(text: str, name: str, largest: float = MAX_NUMBER) -> float:
     """One finite number up to `largest` in size; name: what it is, for the message.
 
     >>> number("-1e3", "q1")

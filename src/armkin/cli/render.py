@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_TERMINAL = 80  # columns of a terminal that does not tell its own
+_TERMINAL_COLUMNS = 80  # columns of a terminal that does not tell its own
 
 
 def head(arm: Arm) -> Head:
@@ -121,7 +121,7 @@ def row(title: str, names: Sequence[str], values: Sequence[str]) -> str:
       tool  110.053   7.5
     """
     across = table([["", *names], [title, *values]])
-    narrow = max(map(len, across.splitlines())) <= _TERMINAL
+    narrow = max(map(len, across.splitlines())) <= _TERMINAL_COLUMNS
     return across if narrow else table([[title, ""], *zip(names, values, strict=True)])
 
 

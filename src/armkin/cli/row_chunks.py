@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from armkin.formula.arrays import Array
 
-ROWS = 32_768  # rows in memory at a time
+CHUNK_ROWS = 32_768  # rows in memory at a time
 
 
 class Chunk(NamedTuple):
@@ -39,6 +39,6 @@ def all_rows(values: Sequence[Sequence[float]]) -> Iterator[Chunk]:
     """Chunks of rows that are there already."""
     import numpy as np
 
-    for start in range(0, len(values), ROWS):
-        part = values[start : start + ROWS]
+    for start in range(0, len(values), CHUNK_ROWS):
+        part = values[start : start + CHUNK_ROWS]
         yield Chunk(range(start + 1, start + 1 + len(part)), np.array(part))

@@ -97,7 +97,7 @@ def _of_rows(arm: Arm, batch: str) -> Goals | Stream:
     return _checked_goals(arm, [number for number, _ in numbered], [values for _, values in numbered])
 
 
-_NEIGHBOURS = 2.5  # distance [pulses] from the exact value within which `pulses --best` may choose
+_NEIGHBOUR_DISTANCE = 2.5  # distance [pulses] from the exact value within which `pulses --best` may choose
 _MAX_PULSES = 2**53  # pulses of a goal, at most
 
 
@@ -197,7 +197,7 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
         raise UsageError(f"the answer on standard input is damaged: {max(counts, key=abs)} pulses")
     meant = armkin.joints(arm, counts)
     pulse_error = np.abs(meant - q) / resolution(arm)
-    if (worst := int(pulse_error.argmax())) >= 0 and pulse_error[worst] > _NEIGHBOURS:
+    if (worst := int(pulse_error.argmax())) >= 0 and pulse_error[worst] > _NEIGHBOUR_DISTANCE:
         shown, by_pulses = (float(units.joints_out(arm, values)[worst]) for values in (q, meant))
         name = arm.joint_names[worst]
         raise UsageError(

@@ -11,9 +11,9 @@ from contextlib import contextmanager
 from armkin.cli import output
 from armkin.errors import UsageError
 
-_BEGINS = 0.8  # time [s] after which a held key is sent again at the latest, on every system's default
-_AGAIN = 0.25  # time [s] between two repeats of a held key, at most
-_POLL = 0.01  # time [s] that one look takes
+_FIRST_REPEAT_TIME = 0.8  # time [s] after which a held key is sent again at the latest, on every system's default
+_REPEAT_PERIOD = 0.25  # time [s] between two repeats of a held key, at most
+_POLL_TIME = 0.01  # time [s] that one look takes
 _ARROWS = {"[C": "+", "[A": "+", "[D": "-", "[B": "-", "OC": "+", "OA": "+", "OD": "-", "OB": "-"}
 _ARROWS_WINDOWS = {"M": "+", "H": "+", "K": "-", "P": "-"}
 
@@ -47,7 +47,7 @@ class Keys:
 
     def held(self, key: str) -> Callable[[], bool] | None:
         """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
-        pressed = self._poll(_BEGINS)
+        pressed = self._poll(_FIRST_REPEAT_TIME)
         if pressed != key:
             self._next_key = pressed
             return None
@@ -55,19 +55,19 @@ class Keys:
 
         def is_held() -> bool:
             nonlocal last
-            pressed = self._poll(_POLL)
+            pressed = self._poll(_POLL_TIME)
             if pressed == key:
                 last = time.monotonic()
             elif pressed:
                 self._next_key = pressed
-            return pressed in ("", key) and time.monotonic() - last < _AGAIN
+            return pressed in ("", key) and time.monotonic() - last < _REPEAT_PERIOD
 
         return is_held
 
     def _wait_for_silence(self) -> None:
         """Wait until no key comes: one that was held until now answers nothing."""
         self._next_key = ""
-        while self._poll(_AGAIN):
+        while self._poll(_REPEAT_PERIOD):
             pass
 
 

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import RobotFile
 
-_METRES = 2.0  # distance [mm]: a target this near to the base, or an arm this short, was meant in metres
-_RADIANS = 3.2  # angle [deg]: a little more than pi
+_TINY_REACH = 2.0  # distance [mm]: a target this near to the base, or an arm this short, was meant in metres
+_MAX_RADIANS = 3.2  # angle [deg]: a little more than pi
 _BIG_REACH = 50.0  # reach [mm] of an arm whose file is certainly in mm
-_TURNS = (math.pi / 2, math.pi)
+_TURN_ANGLES = (math.pi / 2, math.pi)
 
 
 def robot_file(arm: Arm) -> None:
@@ -24,7 +24,7 @@ def robot_file(arm: Arm) -> None:
     if arm.file is None:
         return
     total = sum(map(abs, _lengths(arm.file)))
-    if 0 < total < _METRES:
+    if 0 < total < _TINY_REACH:
         output.note(f"all lengths in {arm.path} together are {total:.4g} mm; if they are metres, multiply them by 1000")
     angle = next(filter(_is_turn, _angles(arm.file)), None)
     if angle is not None:
@@ -49,13 +49,13 @@ def _angles(file: RobotFile) -> Iterator[float]:
 
 def _is_turn(angle: float) -> bool:
     """Whether it is a right or a straight angle in radians."""
-    return any(abs(abs(angle) - turn) < 1e-3 for turn in _TURNS)
+    return any(abs(abs(angle) - turn) < 1e-3 for turn in _TURN_ANGLES)
 
 
 def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values") -> None:
     """Joint values that are all below pi, with digits after the point; source: where they stand."""
     turning = [value for value, sliding in zip(values, arm.prismatic, strict=True) if not sliding]
-    if not turning or max(map(abs, turning)) > _RADIANS or not any(_has_digits(value) for value in turning):
+    if not turning or max(map(abs, turning)) > _MAX_RADIANS or not any(_has_digits(value) for value in turning):
         return
     output.note(f"{source} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
 
@@ -63,7 +63,8 @@ def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values"
 def note_target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> None:
     """A position within 2 mm of the base's origin, asked of an arm of ordinary size."""
     position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
-    if position and max(map(abs, position)) < _METRES and any(map(_has_digits, position)) and arm.reach > _BIG_REACH:
+    is_tiny = bool(position) and max(map(abs, position)) < _TINY_REACH
+    if is_tiny and any(map(_has_digits, position)) and arm.reach > _BIG_REACH:
         output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
     angles = [v for v, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
     if any(map(_has_digits, angles)) and any(map(_is_turn, angles)):

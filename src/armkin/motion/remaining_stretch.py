@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Stretch
 
-_STEP = 0.002  # step [s] of the plan's time between grid points
+_TIME_STEP = 0.002  # step [s] of the plan's time between grid points
 _SHORT_TIME = 0.05  # length [s] of the plan's time below which what is left is slow, and as good as straight
 
 
@@ -51,7 +51,7 @@ def _grid_times(stretch: Stretch, begin: float) -> Array:
     """Times of the plan from `begin` to its end, 2 ms apart at most; where its acceleration jumps there is one."""
     jumps = stretch.times[stretch.times > begin + 1e-4] if isinstance(stretch, Curve) else np.array([stretch.duration])
     edges = np.concatenate([[begin], jumps])
-    parts = np.maximum(np.ceil(np.diff(edges) / _STEP), 1).astype(int)
+    parts = np.maximum(np.ceil(np.diff(edges) / _TIME_STEP), 1).astype(int)
     return np.asarray(np.interp(np.arange(parts.sum() + 1), np.concatenate([[0], np.cumsum(parts)]), edges))
 
 

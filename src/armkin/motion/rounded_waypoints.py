@@ -22,7 +22,7 @@ from armkin.motion.timing.trajectory import Trajectory
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_NODES = 12  # grid points of a line, and of a corner
+_NODE_COUNT = 12  # grid points of a line, and of a corner
 
 
 def round_waypoints(
@@ -74,14 +74,14 @@ def _rounded_way(corners: Array, blend: float) -> Knots:
     way = side / length[:, None]
     cut = np.concatenate([[0.0], np.minimum(blend, np.minimum(length[:-1], length[1:]) / 2), [0.0]])
     q, d, s = [corners[:1]], [way[:1]], [np.zeros(1)]
-    f = np.linspace(0.0, 1.0, _NODES + 1)[1:, None]
+    f = np.linspace(0.0, 1.0, _NODE_COUNT + 1)[1:, None]
     length_before = 0.0
     for k in range(len(side)):
         a = corners[k] + cut[k] * way[k]
         straight = length[k] - cut[k] - cut[k + 1]
         if straight > 1e-9 * length[k]:
             q.append(a + f * straight * way[k])
-            d.append(np.repeat(way[k : k + 1], _NODES, axis=0))
+            d.append(np.repeat(way[k : k + 1], _NODE_COUNT, axis=0))
             s.append(length_before + f[:, 0] * straight)
             length_before += straight
         if k + 1 < len(side):  # a parabola: from the one side to the other, its tangents the sides

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 Job = Callable[[Backend], None]
 
-_POLL = 0.25  # time [s] between two looks at a board that stands
-_TELL = 0.08  # time [s] between two positions of an arm that moves: what a page can draw
+_POLL_PERIOD = 0.25  # time [s] between two looks at a board that stands
+_TELL_PERIOD = 0.08  # time [s] between two positions of an arm that moves: what a page can draw
 
 
 class BoardThread:
@@ -123,7 +123,7 @@ class BoardThread:
 
     def _run_jobs(self) -> None:
         while not self._ended:
-            self._wake.wait(_POLL)
+            self._wake.wait(_POLL_PERIOD)
             self._wake.clear()
             with self._lock:
                 job, self._job = self._job, None
@@ -173,7 +173,7 @@ class BoardThread:
 
     def _watch(self) -> bool:
         """Asked at every turn of a session: tell where the pins are now, and whether to stop."""
-        if self.machine is not None and time.monotonic() - self._told_at >= _TELL:
+        if self.machine is not None and time.monotonic() - self._told_at >= _TELL_PERIOD:
             self.board.heard()
             self._publish()
         return self._stop.is_set() or self._let_go()

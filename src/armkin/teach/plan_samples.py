@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-SHOWN = 0.2  # distance [mm] that the tip shown may be off where it is looked at, for less than 0.5 in between
+SHOWN_DISTANCE = 0.2  # distance [mm] that the tip shown may be off where it is looked at, for less than 0.5 in between
 MAX_SAMPLES = 160_000  # samples, at most, of some 80 bytes; a plan that needs more is shown less exactly, as is said
 
 
@@ -24,7 +24,7 @@ def playback_json(arm: Arm, plan: PathPlan) -> dict[str, Any]:
     `approach_s`: of the joint move that comes before it, from where the arm stands to its start.
     """
     begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
-    t, deviation = sample_times(arm, plan, begins, SHOWN, MAX_SAMPLES)
+    t, deviation = sample_times(arm, plan, begins, SHOWN_DISTANCE, MAX_SAMPLES)
     q = plan.q(t)
     with np.errstate(invalid="ignore"):
         shares = np.nan_to_num(np.abs(plan.qd(t)) / arm.max_speed)

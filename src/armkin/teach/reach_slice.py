@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 VOXELS_ACROSS = 12  # voxels from joint 1's axis to the end of the reach
-DIRECTIONS = 12  # directions of the tool's z axis in each voxel
-VALUES = 12  # values of the redundant joint over its range where the others have a closed form; else it stays at home
+DIRECTION_COUNT = 12  # directions of the tool's z axis in each voxel
+VALUE_COUNT = 12  # values of the redundant joint over its range if the others have a closed form; else it is at home
 
 
 @lru_cache(maxsize=4)
@@ -37,10 +37,10 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
     free = redundancy(real_arm, None)
     step = arm.reach / VOXELS_ACROSS
     if free is None:  # azimuths 0 and 180 degrees alone: the plane
-        reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTIONS, rolls=1, measures=False)
+        reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTION_COUNT, rolls=1, measures=False)
         grid, shares, values = reach_map.grid, reach_map.columns["share"], 0
     else:
-        grid = Grid(real_arm, step, 2, DIRECTIONS, 1, False)
+        grid = Grid(real_arm, step, 2, DIRECTION_COUNT, 1, False)
         values_held = _held_values(real_arm, free)
         shares, values = _reached_shares(grid, free, values_held), len(values_held)
     plane = voxels.section_layer(grid)
@@ -63,7 +63,7 @@ def _held_values(arm: Arm, free: Redundancy) -> Array:
     if not free.by_formula:
         return np.array([home])
     low, high = (low if np.isfinite(low) else home - np.pi), (high if np.isfinite(high) else home + np.pi)
-    return np.append(home, np.linspace(low, high, VALUES - 1))
+    return np.append(home, np.linspace(low, high, VALUE_COUNT - 1))
 
 
 def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:

@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from armkin.path_file import PathFile
 
 MAX_MOVES = 2000  # moves of a program, at most
-_UNDO = 100  # steps that can be undone
+_MAX_UNDO = 100  # steps that can be undone
 _DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
 _SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
-_NAMED = re.compile(r"^\s*- .*?#\s*(?P<name>.+?)\s*$")
+_NAMED_STEP = re.compile(r"^\s*- .*?#\s*(?P<name>.+?)\s*$")
 
 
 class Program:
@@ -93,7 +93,7 @@ class Program:
         except Exception:
             self._restore(before)
             raise
-        self._undo_states = [*self._undo_states[-_UNDO + 1 :], before]
+        self._undo_states = [*self._undo_states[-_MAX_UNDO + 1 :], before]
         self._redo_states = []
 
     def document(self) -> dict[str, Any]:
@@ -126,11 +126,11 @@ class Program:
         moves = document.pop("moves")
         if len(moves) > MAX_MOVES:
             raise UsageError(f"{name} has {len(moves)} moves; the page takes {MAX_MOVES}")
-        self._undo_states = [*self._undo_states[-_UNDO + 1 :], self._snapshot()]
+        self._undo_states = [*self._undo_states[-_MAX_UNDO + 1 :], self._snapshot()]
         self._redo_states = []
         self.head, self.moves, self.via = document, moves, None
         items = [line for line in text.splitlines() if line.lstrip().startswith("- ")]
-        matches = [_NAMED.match(line) for line in items]
+        matches = [_NAMED_STEP.match(line) for line in items]
         named = [match["name"][:60] if match else "" for match in matches]
         self.names = named if len(named) == len(moves) else [""] * len(moves)
 

@@ -25,9 +25,9 @@ from armkin.teach.page_key import KEY, TAB, Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-_STRANGERS = 100  # connections that have not shown the key, at most; beyond, the oldest one is closed
-_LOOK = 0.1  # time [s] between two looks at whether a page is still there
-_SILENT = 15.0  # time [s] after which an event stream says something, so that dead lines are noticed
+_MAX_STRANGERS = 100  # connections that have not shown the key, at most; beyond, the oldest one is closed
+_LOOK_PERIOD = 0.1  # time [s] between two looks at whether a page is still there
+_SILENCE_TIME = 15.0  # time [s] after which an event stream says something, so that dead lines are noticed
 
 
 class Server(ThreadingHTTPServer):
@@ -52,7 +52,7 @@ class Server(ThreadingHTTPServer):
         """Serve a new connection; of too many that have shown no key, close the oldest."""
         with self._lock:
             self._strangers[id(request)] = request
-            while len(self._strangers) > _STRANGERS:
+            while len(self._strangers) > _MAX_STRANGERS:
                 _, oldest = self._strangers.popitem(last=False)
                 _shut_down(oldest)
         super().process_request(request, client_address)
@@ -160,12 +160,12 @@ class _Handler(BaseHTTPRequestHandler):
             self.wfile.flush()
             silent = 0.0
             while not self._is_gone():
-                news = tab.hear(_LOOK)
-                silent = 0.0 if news else silent + _LOOK
+                news = tab.hear(_LOOK_PERIOD)
+                silent = 0.0 if news else silent + _LOOK_PERIOD
                 for topic, message in news.items():
                     text = json.dumps(message, allow_nan=False)
                     self.wfile.write(f"event: {topic}\ndata: {text}\n\n".encode())
-                if silent >= _SILENT:
+                if silent >= _SILENCE_TIME:
                     self.wfile.write(b":\n\n")
                     silent = 0.0
                 self.wfile.flush()

@@ -11,7 +11,7 @@ from typing import Any
 from armkin.teach.page_key import RefusedError
 
 MAX_TABS = 4  # pages at once, at most: a browser keeps six connections to a server, and STOP must find one free
-_FORGET = 20.0  # time [s] until a page that has never listened is forgotten
+_FORGET_TIME = 20.0  # time [s] until a page that has never listened is forgotten
 
 
 class Tab:
@@ -57,7 +57,7 @@ class Tabs:
         """A new page. Raises RefusedError if there are too many."""
         with self._lock:
             now = time.monotonic()
-            for tab in [t for t in self._tabs.values() if not t.listening and now - t.born > _FORGET]:
+            for tab in [t for t in self._tabs.values() if not t.listening and now - t.born > _FORGET_TIME]:
                 del self._tabs[tab.id]
             self._check_room()
             if len(self._tabs) >= 10 * MAX_TABS:

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MAX_TRIANGLES = 18_000  # triangles, at most, of an arm: 0.43 MB of a page
-_FILES = 200  # mesh files, at most, of an arm
-_GRID = 1000  # divisor of the reach that gives the finest grid on which corners stand
+_MAX_FILES = 200  # mesh files, at most, of an arm
+_GRID_DIVISOR = 1000  # divisor of the reach that gives the finest grid on which corners stand
 _GRID_FACTOR = 1.25  # factor from a grid to the next one, until no more triangles are left
 _AXIS_DIFFERENCE = 0.1, 1e-3  # difference [mm], [rad], at most, between axes of the URDF and of the arm
 
@@ -32,7 +32,7 @@ def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
     of targets); "" where a body has no mesh. Raises UsageError for the URDF of another arm, or a file that is no mesh.
     """
     bodies = _body_triangles(arm, path)
-    unit = arm.reach / _GRID
+    unit = arm.reach / _GRID_DIVISOR
     while True:
         coarse = [_on_grid(body, unit) for body in bodies]
         if sum(map(len, coarse)) <= MAX_TRIANGLES:
@@ -73,8 +73,8 @@ def _body_triangles(arm: Arm, path: str) -> list[Array]:
         link, T, body = stack.pop()
         for visual in tree.visuals[link]:
             files += "mesh" in visual
-            if files > _FILES:
-                raise UsageError(f"{path}: more than {_FILES} meshes")
+            if files > _MAX_FILES:
+                raise UsageError(f"{path}: more than {_MAX_FILES} meshes")
             if "mesh" in visual:
                 corners = _mesh_triangles(path, link, visual) @ T[:3, :3].T + T[:3, 3]
                 way = arm.base if body == 0 else inverse(after[body - 1]) @ arm.base

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-_STEP = 0.01  # time [s] between the rows of --out
+_ROW_PERIOD = 0.01  # time [s] between the rows of --out
 
 PathSource = Annotated[
     str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")
@@ -333,7 +333,7 @@ def _write_samples(plan: PathPlan, name: str) -> None:
 
     arm = plan.arm
     heading = ["time_s", *arm.joint_names, *(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]
-    t = np.append(np.arange(0.0, plan.duration, _STEP), plan.duration)
+    t = np.append(np.arange(0.0, plan.duration, _ROW_PERIOD), plan.duration)
     with output.destination(name) as write:
         write(csv_line(heading) + "\n")
         for part in np.array_split(t, max(len(t) // 10_000, 1)):

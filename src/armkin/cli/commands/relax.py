@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _MAX_SECONDS = 3600.0  # time [s], at most, that the arm is relaxed and recorded
-_RATE = 10  # rows a second
+_ROW_RATE = 10  # rows a second
 
 
 def relax(
@@ -48,7 +48,7 @@ def relax(
         output.note("the motors are off; armkin send switches them on again, where the arm then stands")
         write(csv_line(arm.joint_names) + "\n")
         begin, rows = machine.port.now(), 0
-        while rows <= _RATE * time and board.wait(begin + rows / _RATE):
+        while rows <= _ROW_RATE * time and board.wait(begin + rows / _ROW_RATE):
             machine.refresh()
             write(csv_line(units.joints_out(arm, machine.joints()).tolist()) + "\n")
             rows += 1

@@ -11,7 +11,7 @@ from armkin.cli.options import Json, TextOut
 if TYPE_CHECKING:
     from armkin.cli.answers import ShippedRobot
 
-_CAN = ("ik", "pulses", "simulate", "send", "home")
+_CAPABILITIES = ("ik", "pulses", "simulate", "send", "home")
 
 
 def robots(json: Json = False, out: TextOut = None) -> None:
@@ -42,7 +42,7 @@ def _robot_entry(name: str) -> ShippedRobot:
         "joint_types": ["prismatic" if sliding else "revolute" for sliding in arm.prismatic],
         "task": task,
         "target_labels": labels,
-        "can": {"ik": not refused, **{command: not lacks[command] for command in _CAN[1:]}},
+        "can": {"ik": not refused, **{command: not lacks[command] for command in _CAPABILITIES[1:]}},
         "lacks": {"ik": refused, **lacks},
         "compared": "" if arm.file is None else arm.file.compared,
     }
@@ -62,10 +62,10 @@ def _task_and_target(arm: Any) -> tuple[str | None, list[str], list[str]]:
 
 
 def _text(robots: list[ShippedRobot]) -> str:
-    rows = [["robot", "joints", "task", "target", *_CAN, "compared"]]
+    rows = [["robot", "joints", "task", "target", *_CAPABILITIES, "compared"]]
     for entry in robots:
         kinds = "".join("P" if kind == "prismatic" else "R" for kind in entry["joint_types"])
-        marks = ["yes" if entry["can"][command] else "-" for command in _CAN]
+        marks = ["yes" if entry["can"][command] else "-" for command in _CAPABILITIES]
         if entry["task"] is not None and not entry["can"]["ik"]:
             marks[0] = "--lock"
         compared = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"

@@ -14,7 +14,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName
 from armkin.cli.options import Json, Robot
 
-_EVERY = 0.2  # time [s] between two readings
+_READ_PERIOD = 0.2  # time [s] between two readings
 
 
 def status(
@@ -61,7 +61,7 @@ def _until_signal(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iter
     """Now and then, until a signal comes: nothing moves that would have to be stopped."""
     while not stop():
         yield
-        time.sleep(_EVERY)
+        time.sleep(_READ_PERIOD)
         refresh()
 
 

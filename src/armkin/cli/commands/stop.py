@@ -11,7 +11,7 @@ from armkin.cli.board_link import Baud, NoReset
 from armkin.cli.default_port import PortName, only_port
 from armkin.errors import LinkError, UsageError
 
-_PATIENCE = 15.0  # time [s] for an arm to come to rest
+_REST_TIMEOUT = 15.0  # time [s] for an arm to come to rest
 
 
 def stop(
@@ -86,7 +86,7 @@ def _end_process(process: int, port: str) -> None:
         ask_to_stop(port, process)
     except OSError as error:
         raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
-    end = time.monotonic() + _PATIENCE
+    end = time.monotonic() + _REST_TIMEOUT
     while holder_pid(port) == process:
         if time.monotonic() > end:
             raise LinkError(f"process {process} does not let go of {port}: cut the motors' power if the arm moves")

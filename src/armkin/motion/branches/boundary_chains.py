@@ -16,16 +16,16 @@ from armkin.inverse.answers.solutions import Status
 from armkin.motion.branches.branch_chains import Chain
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import chord_bound, joint_change, levers, whole_turns
-from armkin.motion.branches.linked_branches import ENDS
+from armkin.motion.branches.linked_branches import END_ACCURACY
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_END_DISTANCE = 10 * ENDS  # distance [mm] of a chain's end before the boundary
+_END_DISTANCE = 10 * END_ACCURACY  # distance [mm] of a chain's end before the boundary
 _SAME_END = 1e-3  # distance [rad | mm] between the ends of two chains that are one
 _SAME_POSTURE = 1e-4  # distance [rad | mm] between two postures that are one
 _MAX_BOUNDARIES = 8  # boundaries on the way, at most: a path along one has thousands, and its chains go on anyway
-_WAYS = 64  # chains, at most, as every boundary may multiply them: what goes through one more boundary comes last
+_MAX_CHAINS = 64  # chains, at most, as every boundary may multiply them: what goes through one more boundary comes last
 
 
 def add_boundary_chains(
@@ -44,7 +44,7 @@ def add_boundary_chains(
         # Beyond it, what was joined at a boundary before it is what its last part was: `chains` has that.
         leaving = [part for c in chains for part in _chains_from(s, c, j, postures, tolerance)]
         ways = (_join_chains(a, b) for a, b in product(arriving, leaving) if _are_consecutive(a, b))
-        joined += islice(ways, max(_WAYS - len(joined), 0))
+        joined += islice(ways, max(_MAX_CHAINS - len(joined), 0))
     postures = columns.q[end][columns.valid[end]]
     return _add_new_chains(joined, [part for c in joined for part in _chains_to(s, c, end, postures, tolerance)])
 

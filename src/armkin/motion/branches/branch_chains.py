@@ -18,7 +18,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import whole_turns
-from armkin.motion.branches.linked_branches import ENDS
+from armkin.motion.branches.linked_branches import END_ACCURACY
 from armkin.motion.plan.trajectory_proof import hit_samples as motion_hits
 
 if TYPE_CHECKING:
@@ -248,7 +248,7 @@ def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None,
         return "end", None, None, status
     count = columns.valid.sum(axis=1)
     # Two branches that meet at the edge of the reach end a sample or two before it.
-    soon = (columns.s > columns.s[e]) & (columns.s < columns.s[e] + 10 * ENDS)
+    soon = (columns.s > columns.s[e]) & (columns.s < columns.s[e] + 10 * END_ACCURACY)
     if (columns.status[soon] == Status.UNREACHABLE).any():
         return "reach", None, None, Status.UNREACHABLE.name.lower()
     return ("boundary" if count[beyond] < count[e] else "singularity"), None, None, status

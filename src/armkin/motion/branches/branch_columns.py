@@ -22,7 +22,7 @@ from armkin.motion.branches.joint_steps import joint_change
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_STEPS, _STAYS = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
+_NEWTON_STEPS, _MAX_MOVEMENT = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
 _BLOCK_SAMPLES = 16_384  # samples solved at once at most
 _STRIDE = 8  # stride of the few samples that are solved first
 
@@ -152,10 +152,10 @@ class Samples:
         arm, task = self.arm, task_for(self.arm, self.task)
         start, loose = q[rows, b], free[rows]
         postures, miss = correct(
-            actual_arm(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_STEPS
+            actual_arm(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_NEWTON_STEPS
         )
         postures /= arm.ratio
-        same = np.where(loose, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _STAYS
+        same = np.where(loose, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _MAX_MOVEMENT
         good = same & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
         q[rows[good], b[good]] = postures[good]
         return q

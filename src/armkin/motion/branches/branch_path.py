@@ -19,7 +19,7 @@ from armkin.motion.branches.boundary_chains import add_boundary_chains
 from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import joint_change
-from armkin.motion.branches.linked_branches import ENDS, link_branches
+from armkin.motion.branches.linked_branches import END_ACCURACY, link_branches
 from armkin.motion.branches.route_grid import Way, refine_grid
 from armkin.motion.branches.wrist_turn import ASIDE_SHARE, add_wrist_chains, has_wrist
 from armkin.motion.branches.wrist_window import add_detours
@@ -34,8 +34,8 @@ from armkin.motors import motor_accel
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_GRID = 1000  # points, at least, of a route's grid
-_STEP = 1.0  # distance [mm], at most, between the first samples
+_MIN_GRID_POINTS = 1000  # points, at least, of a route's grid
+_SAMPLE_STEP = 1.0  # distance [mm], at most, between the first samples
 _SAMPLES = (200, 20_000)  # samples of a route, at least and at most
 _MANY_RESTS = 8  # rests from which on what lies between them is planned together, so many samples at once
 _AT_ONCE = 8192  # samples between rests that are planned at once
@@ -74,19 +74,19 @@ class CarriedRoute:
         """Whether the runs carry everything, with reconfigurations in between."""
         if not self.runs or self.runs[0].first != 0 or self.runs[-1].last != len(self.columns.s) - 1:
             return False
-        s = self.columns.s  # ends of runs are known to ENDS
-        return all(s[b.first] - s[a.last] <= ENDS for a, b in pairwise(self.runs))
+        s = self.columns.s  # ends of runs are known to END_ACCURACY
+        return all(s[b.first] - s[a.last] <= END_ACCURACY for a, b in pairwise(self.runs))
 
     @property
     def moving_runs(self) -> list[Run]:
         """The runs that lead anywhere."""
         s = self.columns.s
-        return self.runs if self.in_one_run else [run for run in self.runs if s[run.last] - s[run.first] > ENDS]
+        return self.runs if self.in_one_run else [run for run in self.runs if s[run.last] - s[run.first] > END_ACCURACY]
 
 
 def route_samples(route: Route, count: int | None = None) -> Array:
     """Where a route is solved first: evenly, and at the ends of its pieces."""
-    number = count or int(max(np.clip(np.ceil(route.length / _STEP), *_SAMPLES), route.length / _MAX_DISTANCE))
+    number = count or int(max(np.clip(np.ceil(route.length / _SAMPLE_STEP), *_SAMPLES), route.length / _MAX_DISTANCE))
     even = np.linspace(0.0, route.length, max(number, 2))
     return np.asarray(_drop_close_values(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
 
@@ -172,7 +172,7 @@ def run_stretches(
     pace: Pace,
     *,
     fixed: Array | None = None,
-    grid: int = _GRID,
+    grid: int = _MIN_GRID_POINTS,
 ) -> list[Curve | Smoothed]:
     """A run as curves from rest to rest, one between each two stops of the route; s: the route's samples."""
     q = run.chain.joints(run.first, run.last, near, fixed)
@@ -181,13 +181,13 @@ def run_stretches(
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
     edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
     edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
-    allowed = None if grid < _GRID else pace.tolerance - route.largest_detour
+    allowed = None if grid < _MIN_GRID_POINTS else pace.tolerance - route.largest_detour
     made: list[Curve | Smoothed] = []
     for part in _group_rests(edges, s):
         a, b, inner = part[0], part[-1], np.array(part[1:-1])
         samples = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
         solved = len(s[samples])  # a long way, of many turns for example, needs more points than a short one
-        number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _GRID), 60)
+        number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _MIN_GRID_POINTS), 60)
         way = Way(route, s[samples], q[samples], a, b, run.chain.windows, inner)
         path, deviations = refine_grid(arm, way, number, allowed)
         _check_deviation(path, deviations + route.largest_detour, pace)

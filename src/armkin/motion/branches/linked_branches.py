@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MIN_STEP = 1e-9  # step, as a share of the route, below which what is not linked is a jump
-ENDS = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
+END_ACCURACY = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
 _TORN_PARTS = 3  # parts of a step in which branches end: where they are more, branches end everywhere
-_PARTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
+_PART_COUNTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
 _AT_ONCE = 1024  # samples solved at once, if the parts are no fewer
 _MAX_SAMPLES = 50_000  # samples added at most
 _BLOCK_STEPS = 16_384  # steps looked at together
@@ -126,7 +126,7 @@ class _Linking:
         """
         c = self.columns
         h = np.diff(c.s)
-        least = np.where(self.both, max(MIN_STEP * self.length, 1e-9), ENDS)
+        least = np.where(self.both, max(MIN_STEP * self.length, 1e-9), END_ACCURACY)
         steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
         # Ends need no more than the formulas; their samples on edges are dear to examine.
         singular = c.status == Status.SINGULAR
@@ -135,7 +135,7 @@ class _Linking:
         steps = steps[plain] if quick else steps
         if not len(steps) or self.added > _MAX_SAMPLES:
             return False
-        parts = int(np.clip(_AT_ONCE // len(steps), *_PARTS))
+        parts = int(np.clip(_AT_ONCE // len(steps), *_PART_COUNTS))
         f = np.arange(1, parts) / parts
         lengths = (c.s[steps, None] + h[steps, None] * f).ravel()
         columns = self.samples.solve_at(lengths, examine=not quick)

@@ -19,19 +19,19 @@ if TYPE_CHECKING:
     from armkin.motion.branches.wrist_window import Window
     from armkin.motion.tool_path.route import Route
 
-_TIMES = 16.0  # factor, at most, on the number of points where the tolerance needs more
-_ROUNDS = 8  # rounds in which intervals are divided
+_MAX_POINT_FACTOR = 16.0  # factor, at most, on the number of points where the tolerance needs more
+_MAX_ROUNDS = 8  # rounds in which intervals are divided
 _BLOCK_POINTS = 8192  # points looked at together
 _COARSE_STEP = 0.05  # step [mm], at most, if the tolerance is not larger
 _MIN_CHORD_TURN = 1.6  # turn [rad] of a chord below which a step may be coarser where slopes are exact
 _SECTION_POINTS = (4, 64)  # points, at least, of a section between two bends, with many sections and with few
 _MIN_POINTS = 2  # points of a section where slopes are exact: they need no neighbours
-_GROWTH = 2.5  # ratio of an interval to the next one, at most: motions speed up and slow down beside bends
-_GROWS = 1.3  # excess of that ratio, as a factor, that stays: the interval is hardly longer
+_GROWTH_RATIO = 2.5  # ratio of an interval to the next one, at most: motions speed up and slow down beside bends
+_EXCESS_FACTOR = 1.3  # excess of that ratio, as a factor, that stays: the interval is hardly longer
 _AROUND_LENGTH = 0.5  # length [mm] of the way about a given point
 _SAME_DISTANCE = 1e-3  # relative difference of distances that are alike: the first place is told
-_REST = 32  # intervals, at least, from rest to rest where there are many rests
-_MOTION = 0.7  # share of the grid that follows the joints; the rest follows the way
+_REST_INTERVALS = 32  # intervals, at least, from rest to rest where there are many rests
+_MOTION_SHARE = 0.7  # share of the grid that follows the joints; the rest follows the way
 
 
 Missed = tuple[float, float] | None  # the greatest distance of a given point from the motion, and where [mm]
@@ -62,10 +62,10 @@ def refine_grid(arm: Arm, way: Way, number: int, tolerance: float | None, exact:
     if exact:
         points, breaks = _grade_grid(points, breaks)
     resting = _nearest_indices(points[breaks], way.stops)
-    most = _TIMES * len(points)
+    most = _MAX_POINT_FACTOR * len(points)
     for damping in DAMPING:
         solved, before = None, None
-        for _ in range(_ROUNDS):
+        for _ in range(_MAX_ROUNDS):
             values = _solve_points(arm, way, points, damping, solved)
             rests = breaks[resting]
             exact_path = exact_cubics(arm, route, points, values, rests, solved) if exact else None
@@ -106,15 +106,15 @@ def _initial_grid(arm: Arm, way: Way, number: int, fewest: int) -> tuple[Array, 
     levels = np.interp(edges, s, measure)
     total = max(float(levels[-1] - levels[0]), 1e-12)
     least_count = int(np.clip(2 * number / (len(edges) - 1), fewest, _SECTION_POINTS[1]))
-    share = _MOTION * np.diff(levels) / total + (1 - _MOTION) * np.diff(edges) / (b - a)
+    share = _MOTION_SHARE * np.diff(levels) / total + (1 - _MOTION_SHARE) * np.diff(edges) / (b - a)
     least = np.full(len(share), least_count)
     if len(stops):
         section_of = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # which part between two stops
-        least = np.maximum(least, -(-_REST // np.bincount(section_of)[section_of]))
+        least = np.maximum(least, -(-_REST_INTERVALS // np.bincount(section_of)[section_of]))
     count = np.maximum((number * share).astype(int), least)
     # places at equal steps of a level that rises with motion and way, in each section between two edges
     grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
-    level = _MOTION * np.interp(grid, s, measure) / total + (1 - _MOTION) * grid / (b - a)
+    level = _MOTION_SHARE * np.interp(grid, s, measure) / total + (1 - _MOTION_SHARE) * grid / (b - a)
     ends = np.interp(edges, grid, level)
     begin = np.cumsum(count) - count
     points = np.append(np.interp(divide_spans(ends, count), level, grid), b)
@@ -147,8 +147,8 @@ def _grade_grid(points: Array, breaks: Int) -> tuple[Array, Int]:
     """Points (N,) with more where an interval is long beside its neighbour; breaks keep their places."""
     while True:
         h = np.diff(points)
-        left, right = _GROWTH * np.append(np.inf, h[:-1]), _GROWTH * np.append(h[1:], np.inf)
-        long = np.flatnonzero(h > _GROWS * np.minimum(left, right))
+        left, right = _GROWTH_RATIO * np.append(np.inf, h[:-1]), _GROWTH_RATIO * np.append(h[1:], np.inf)
+        long = np.flatnonzero(h > _EXCESS_FACTOR * np.minimum(left, right))
         if not len(long):
             return points, breaks
         new_points = np.where(left <= right, points[:-1] + left, points[1:] - right)[long]

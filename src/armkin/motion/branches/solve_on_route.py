@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 
 DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad] at first, and where that swings joints round beside a singularity
 _BLOCK_POINTS = 8192  # points looked at together
-_SETTLED = 1e-8  # relative length of a Newton step after which the next one would be nothing
+_SETTLED_LENGTH = 1e-8  # relative length of a Newton step after which the next one would be nothing
 _SHORT_STEP, _STEP_RATIO = 1e-5, 1e-3  # relative length of a step, and ratio to the one before, that end the method
 _SLOPE_DISTANCE = 1e-6  # distance [mm] along the route to the target that tells a slope
 _SLOPE_DAMPING = 0.02  # damping [mm/rad] of slopes: rounding is multiplied little
-_LOST = 1e-5  # share of a slope that damping takes: where it is more a singularity is near
+_DAMPED_SHARE = 1e-5  # share of a slope that damping takes: where it is more a singularity is near
 
 
 def correct_to_route(
@@ -50,7 +50,7 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
         solved[open_] = q + step.T * unit
         # where a step is so much shorter than the one before, the next one would be nothing
-        going = (size >= _SETTLED) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * before))
+        going = (size >= _SETTLED_LENGTH) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * before))
         open_, before = open_[going], size[going]
         if not len(open_):
             break
@@ -136,6 +136,6 @@ def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> 
     rate = (misses_aside - misses) / (aside - s)
     d = _damped_steps(J, rate, (_SLOPE_DAMPING / arm.reach) ** 2)
     unexplained = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
-    if not (unexplained <= _LOST * np.abs(rate).max(axis=0)).all():
+    if not (unexplained <= _DAMPED_SHARE * np.abs(rate).max(axis=0)).all():
         return None
     return np.asarray(d.T * radian_or_reach(arm))

@@ -31,17 +31,17 @@ if TYPE_CHECKING:
 
 ASIDE_SHARE = 0.5  # share of the tolerance by which the tip may go aside
 _NEAR_DISTANCE = 2.0  # distance [tolerances] from straight beyond which a wrist is not looked at
-_ARM = 0.1  # movement [rad] of the first three joints between two postures that are a flip of the wrist apart
-_HALF, _GROW, _WIDTHS = 0.25, 1.5, 14  # half [mm] of the least window; factor from one to the next; how many are tried
-_GAP = 0.1  # distance [mm] between the end of one window and the begin of the next
-_STEP = 0.01  # distance [mm] to either side at which slopes are taken
-_LOOKED = 97  # places in a window at which the tool's rotation is looked at
+_ARM_MOVEMENT = 0.1  # movement [rad] of the first three joints between two postures that are a flip of the wrist apart
+_HALF_WIDTH, _WIDTH_FACTOR, _WIDTH_COUNT = 0.25, 1.5, 14  # windows: least half [mm], factor, number
+_WINDOW_GAP = 0.1  # distance [mm] between the end of one window and the begin of the next
+_SLOPE_STEP = 0.01  # distance [mm] to either side at which slopes are taken
+_PLACE_COUNT = 97  # places in a window at which the tool's rotation is looked at
 _MAX_SINGULARITIES = 16  # singularities, at most, on the way
 _EXACT_ERROR = 1e-6  # error [mm and rad] below which a posture meets its target
-_ROUNDING = 1e-12  # share of the wrist's volume that is rounding
-_TOLD = 1e-4  # share of the wrist's volume below which it does not tell joint 4
+_ROUNDING_SHARE = 1e-12  # share of the wrist's volume that is rounding
+_VOLUME_SHARE = 1e-4  # share of the wrist's volume below which it does not tell joint 4
 _MIN_WEIGHT = 1e-8  # weight [1/mm] of a millimetre beside a radian where the tool's direction must be kept
-_STEPS = 8  # steps of Newton's method to a straight wrist
+_NEWTON_STEPS = 8  # steps of Newton's method to a straight wrist
 
 
 def has_wrist(arm: Arm) -> bool:
@@ -102,7 +102,7 @@ def _wrist_volume(arm: Arm, q: Array) -> Array:
 def _straight_samples(arm: Arm, c: Chain, near: float) -> list[int]:
     """Samples at which a chain's wrist comes nearest to straight, and near enough."""
     volumes = np.abs(_wrist_volume(arm, c.q))
-    volumes[volumes < _ROUNDING] = 0.0  # else every other sample of a way that is singular throughout were a least one
+    volumes[volumes < _ROUNDING_SHARE] = 0.0  # else every other sample of an all singular way were a least one
     step = np.diff(volumes)
     least = np.append(True, step <= 0) & np.append(step > 0, True)
     between = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))  # it may be nearer by so much
@@ -115,7 +115,7 @@ def _window_spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -
     low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
     low = max(low, s[c.first], c.windows[-1].end if c.windows else 0.0)
     high = min(high, s[next_chain.last])
-    for half in _HALF * _GROW ** np.arange(_WIDTHS):
+    for half in _HALF_WIDTH * _WIDTH_FACTOR ** np.arange(_WIDTH_COUNT):
         a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
         if a < c.first or b > min(next_chain.last, len(s) - 1) or s[a] < low or s[b] > high:
             return
@@ -147,10 +147,10 @@ def _chain_through_window(
 ) -> Chain | None:
     """A chain up to a window about sample j, and from there on another one, or itself again; None: none is allowed."""
     next_sample = max(j, next_chain.first)  # exactly on the singularity one may end, and the other one begin behind it
-    if not (c.first <= j <= c.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _GAP):
+    if not (c.first <= j <= c.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _WINDOW_GAP):
         return None
     step = joint_change(arm, c.q[j - c.first], next_chain.q[next_sample - next_chain.first])
-    if np.abs(step[:3]).max() > _ARM:
+    if np.abs(step[:3]).max() > _ARM_MOVEMENT:
         return None
     spans = list(_window_spans(route, s, c, next_chain, j))
 
@@ -177,7 +177,7 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
     if window.detour is None or not len(s):
         return q
     q = correct_to_route(arm, route.task, q, add_detours(route, (window,)).targets(s), steps=12)
-    bent = np.abs(_wrist_volume(arm, q)) > _TOLD  # nearer to straight joints 4 and 6 go on as they do beside it
+    bent = np.abs(_wrist_volume(arm, q)) > _VOLUME_SHARE  # nearer to straight joints 4 and 6 go on as they do beside it
     lengths = np.concatenate([[window.begin], s[bent], [window.end]])
     beside = np.concatenate([window.q[:1], q[bent], window.q[1:]])
     for j in (3, 5):
@@ -187,7 +187,7 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
 
 def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None:
     """The window with the tip aside, as little as it can be, to where the wrist is straight; None: it is nowhere."""
-    s = np.linspace(window.begin, window.end, _LOOKED)
+    s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     q = window.joints(arm, route, s)
     bent = _wrist_volume(arm, q)
     flips = np.flatnonzero(bent[:-1] * bent[1:] <= 0)
@@ -197,9 +197,9 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
     f = float(bent[i] / (bent[i] - bent[i + 1]))
     posture, length = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
     free = [0, 1, 2, 3, 5]
-    for _ in range(_STEPS):  # the tool's direction first, then the tip as near as it goes; joint 5 is straight
-        target, beyond = route.targets(np.array([length, length + _STEP]))
-        along = (beyond - target)[:3, 3] / _STEP
+    for _ in range(_NEWTON_STEPS):  # the tool's direction first, then the tip as near as it goes; joint 5 is straight
+        target, beyond = route.targets(np.array([length, length + _SLOPE_STEP]))
+        along = (beyond - target)[:3, 3] / _SLOPE_STEP
         T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
         displacement = T[:3, 3] - target[:3, 3]
         miss = np.concatenate([-_MIN_WEIGHT * displacement, _small_turns(T, target)])
@@ -210,7 +210,7 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
 
 def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints follow a window's detour, all along."""
-    s = np.linspace(window.begin, window.end, _LOOKED)
+    s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     T, goal = fk(arm, _joints_in_window(arm, route, window, s)), add_detours(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
     return bool(missed < _EXACT_ERROR)
@@ -227,11 +227,11 @@ def _window_between(arm: Arm, route: Route, lengths: Array, start: Array, end: A
     q = np.stack([start, start + joint_change(arm, start, end)])
     slopes = []
     for s, posture in zip(lengths.tolist(), q, strict=True):
-        neighbours = np.clip([s - _STEP, s + _STEP], 0.0, route.length)
+        neighbours = np.clip([s - _SLOPE_STEP, s + _SLOPE_STEP], 0.0, route.length)
         exact = correct_to_route(arm, route.task, np.stack([posture, posture]), route.targets(neighbours), steps=12)
         slopes.append((exact[1] - exact[0]) / (neighbours[1] - neighbours[0]))
     window = Window(float(lengths[0]), float(lengths[1]), q, np.array(slopes), np.inf)
-    s = np.linspace(window.begin, window.end, _LOOKED)
+    s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     T, target = fk(arm, window.joints(arm, route, s)), route.targets(s)
     if np.linalg.norm(T[:, :3, 3] - target[:, :3, 3], axis=1).max() > 1e-6:
         return window

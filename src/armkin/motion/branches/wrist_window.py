@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Detour, Route
 
-_STEPS = 12  # steps of Newton's method
+_NEWTON_STEPS = 12  # steps of Newton's method
 _MAX_STEP = 0.1  # length [rad], at most, of a step of Newton's method
 
 
@@ -47,7 +47,7 @@ class Window:
         d0, d1, chord = self.d[0] * h, self.d[1] * h, self.q[1] - self.q[0]
         q = self.q[0] + f * (d0 + f * (3 * chord - 2 * d0 - d1 + f * (d0 + d1 - 2 * chord)))
         goal = route.targets(s)[:, :3, 3]
-        for _ in range(_STEPS):
+        for _ in range(_NEWTON_STEPS):
             miss = goal - position(arm, q)
             # the first three joints may be exactly singular somewhere
             step = nudged(np.linalg.solve, np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]

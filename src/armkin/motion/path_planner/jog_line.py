@@ -23,11 +23,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-TOP = 250.0  # speed [mm/s] of the tool at 100 %: ISO 10218-1 allows no more while somebody guides an arm by hand
-TURNING = np.deg2rad(60.0)  # speed [rad/s] at which the tool turns at 100 %
+MAX_TOOL_SPEED = 250.0  # speed [mm/s] of the tool at 100 %: ISO 10218-1 allows no more where an arm is guided by hand
+MAX_TURN_SPEED = np.deg2rad(60.0)  # speed [rad/s] at which the tool turns at 100 %
 MAX_SECONDS = 10.0  # time [s], at most, of a line
-STEP = 2.0  # distance [mm], or hundredths of a radian, between postures that are looked at
-SLOW_SHARE = 0.1  # share of TOP: where joints at full speed carry the tool slower than this, a singularity is near
+POSTURE_STEP = 2.0  # distance [mm], or hundredths of a radian, between postures that are looked at
+SLOW_SHARE = 0.1  # share of MAX_TOOL_SPEED: where joints at full speed carry the tool slower, a singularity is near
 Frame = Literal["base", "tool"]
 
 
@@ -47,23 +47,24 @@ def jog_axes(arm: Arm) -> tuple[str, ...]:
 def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple[PathPlan, str]:
     """The longest line from joint values (n,) along an axis, and what ends it ("" where it is the time).
 
-    share: -1 to 1, not 0, of TOP or TURNING. The line keeps the arm's branch and ends before a limit, a singularity or
-    a hit, at rest. Raises UsageError for an axis that the arm does not have, NoSolutionError where no way leads.
+    share: -1 to 1, not 0, of MAX_TOOL_SPEED or MAX_TURN_SPEED. The line keeps the arm's branch and ends before a limit,
+    a singularity or a hit, at rest. Raises UsageError for an axis that the arm does not have, NoSolutionError
+    where no way leads.
     """
     check_rates(arm)
     task = task_for(arm, None)
     if axis not in jog_axes(arm):
         raise UsageError(f"axis: '{axis}' is none of {', '.join(jog_axes(arm))}")
     turns = axis not in ("x", "y", "z")
-    top = TURNING if turns else TOP
-    step = np.sign(share) * (STEP / 100 if turns else STEP)
+    top = MAX_TURN_SPEED if turns else MAX_TOOL_SPEED
+    step = np.sign(share) * (POSTURE_STEP / 100 if turns else POSTURE_STEP)
     most = max(int(min(MAX_SECONDS * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
     count, why = _steps_carried(arm, task, q, axis, frame, step, most)
     while count:
         target = _shift_target(arm, task, q, axis, frame, step * count)
         [line] = targets_out(task.labels, target[None])
         try:
-            speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * TOP}
+            speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * MAX_TOOL_SPEED}
             plan = path(arm, {"moves": [{"line": list(line)}], **speed}, start=q)
         except NoSolutionError as error:
             count, why = count // 2, error.message  # a hit between two postures, or what the corner of a branch hides
@@ -75,7 +76,7 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
 def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: float, most: int) -> tuple[int, str]:
     """How many steps the arm's own branch follows, and what ends it."""
     unit, posture = radian_or_reach(arm), q
-    top = TOP if axis in ("x", "y", "z") else TURNING
+    top = MAX_TOOL_SPEED if axis in ("x", "y", "z") else MAX_TURN_SPEED
     stuck = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
     before, leaving = np.inf, False  # an arm that stands near a singularity may leave it
     for k in range(1, most + 1):

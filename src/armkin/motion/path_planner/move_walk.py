@@ -31,7 +31,7 @@ from armkin.motion.timing.limit_jerk import Smoothed, joint_way, joint_ways
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers, path_pieces
-from armkin.motion.tool_path.dense_points import FIT, PLAN, Polyline
+from armkin.motion.tool_path.dense_points import FIT_SHARE, PLAN_SHARES, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.path_pieces import Piece, Spot, split_target
 from armkin.motion.tool_path.route import ReducedBlends, join_pieces
@@ -242,8 +242,8 @@ class Walk:
             self.goal = None
             return
         tolerance = self.pace.tolerance
-        pauses = frozenset(self.pauses)
-        route, order = join_pieces(self.task, self.pieces, self.blends, pauses, FIT * tolerance, self.plan.reduced)
+        pauses, fit = frozenset(self.pauses), FIT_SHARE * tolerance
+        route, order = join_pieces(self.task, self.pieces, self.blends, pauses, fit, self.plan.reduced)
         if route.length < path_pieces.MIN_LENGTH:
             raise UsageError("the tool's way has no length: its points are all the same")
         free = self.goal is not None
@@ -309,7 +309,7 @@ def _timed_curves(
     """A run in time, and what it misses of given points: a route fitted to them leaves it little tolerance."""
     if not len(route.given_points[0]):
         return run_stretches(arm, route, s, run, near, pace, fixed=fixed), None
-    for share in PLAN:
+    for share in PLAN_SHARES:
         tight = replace(pace, tolerance=share * pace.tolerance)
         made = run_stretches(arm, route, s, run, near, tight, fixed=fixed)
         misses = largest_miss(arm, route, joint_ways(made))

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.redundant import redundancy
 from armkin.motion.joint_moves import check_rates
-from armkin.motion.path_planner.path_request import HOLD, PathRequest, plan_path
+from armkin.motion.path_planner.path_request import HOLD_FACTOR, PathRequest, plan_path
 from armkin.motion.path_planner.redundant_joint import path_redundant
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.tool_path import path_numbers
@@ -35,7 +35,7 @@ def path(
     accel: float = 1.0,
     tool_speed: float | None = None,
     jerk: ArrayLike | None = None,
-    hold: float | None = HOLD,
+    hold: float | None = HOLD_FACTOR,
     split: bool = False,
     samples: int | None = None,
 ) -> PathPlan:

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.path_file import PathFile
 
 TOLERANCE = 0.05  # distance [mm] that the tool may be off its path
-HOLD = 1.5  # factor on max_accel during a hold
+HOLD_FACTOR = 1.5  # factor on max_accel during a hold
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class PathRequest:
     accel: float = 1.0
     tool_speed: float | None = None
     jerk: ArrayLike | None = None
-    hold: float | None = HOLD
+    hold: float | None = HOLD_FACTOR
     split: bool = False
     samples: int | None = None
 

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import Move, PathFile
 
-VALUES = 72  # values of the redundant joint, over its range, that are asked
-STEP = 0.02  # distance, as a share of the arm's reach, between targets that are asked
+VALUE_COUNT = 72  # values of the redundant joint, over its range, that are asked
+TARGET_STEP = 0.02  # distance, as a share of the arm's reach, between targets that are asked
 MAX_TARGETS = 200  # targets of a way, at most, that are asked
-GAP = 0.01  # distance, as a share of the arm's reach, that values had best keep from what must not be touched
-POSTURES = 8_000  # targets, at most, that are asked for that distance
+MIN_GAP = 0.01  # distance, as a share of the arm's reach, that values had best keep from what must not be touched
+MAX_POSTURES = 8_000  # targets, at most, that are asked for that distance
 MAX_VALUES = 6  # values, at most, that are planned for
 SAME_VALUE = 1e-9  # difference [rad] of values of joint moves that are one
 
@@ -75,7 +75,7 @@ def _values_over_range(arm: Arm, joint: int, close: float) -> Array:
     """Values over a joint's range [rad], and the one that it had best have, within it."""
     low, high = float(arm.lower[joint]), float(arm.upper[joint])
     low, high = (low if np.isfinite(low) else close - np.pi), (high if np.isfinite(high) else close + np.pi)
-    return np.append(np.linspace(low, high, VALUES), close if low <= close <= high else low)
+    return np.append(np.linspace(low, high, VALUE_COUNT), close if low <= close <= high else low)
 
 
 def _start_posture(arm: Arm, file: PathFile, standing: Array) -> Array | None:
@@ -132,15 +132,15 @@ def _path_of_other_joints(arm: Arm, file: PathFile, joint: int) -> PathFile:
 def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, start: float) -> Iterator[float]:
     """Values of the redundant joint to plan for [rad]: those at which targets along all ways have a branch.
 
-    Those at which it hits nothing come first, and of these those that keep `GAP`; then the nearest to `close`. Where
-    there is none, the one at which most have. A way that begins where the joints stand keeps them there.
+    Those at which it hits nothing come first, and of these those that keep `MIN_GAP`; then the nearest to `close`.
+    Where there is none, the one at which most have. A way that begins where the joints stand keeps them there.
     """
     turned = actual_arm(arm)
     spare = redundancy(turned, task or file.task)
     assert spare is not None
     j = spare.joint
     try:
-        _, ways = route_targets(arm, file.model_copy(update={"task": task or file.task}), STEP * arm.reach)
+        _, ways = route_targets(arm, file.model_copy(update={"task": task or file.task}), TARGET_STEP * arm.reach)
     except UsageError:  # what is wrong with it, if anything, is said by its plan
         yield start
         return
@@ -153,8 +153,8 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, close: float, sta
     carried = order[lacking[0, order] == lacking.min()]
     if turned.keep_out and not turned.ignores_keep_out and len(carried) > 1:
         # near a keep-out a proof takes long: values that keep away from it come first
-        margins = [0.0, GAP * turned.reach]
-        count = max(POSTURES // (len(carried) * len(ways)), 2)
+        margins = [0.0, MIN_GAP * turned.reach]
+        count = max(MAX_POSTURES // (len(carried) * len(ways)), 2)
         near = np.zeros((3, len(carried)), int)
         for way in ways:
             near += _count_lacking(turned, spare, way, joint_angles[carried], min(count, MAX_TARGETS), margins)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-_FIRST = 0.5  # time [s], at most, between two of the first samples
+_MAX_FIRST_STEP = 0.5  # time [s], at most, between two of the first samples
 _INNER_PARAMETERS = (0.21, 0.5, 0.79)  # parameters between two samples at which the motion is looked at
 
 
@@ -23,7 +23,7 @@ def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, mo
     Where they may be too few, those intervals are divided first that leave the most.
     Drawn: joints that go evenly between two times, and the tip's way as its chord. begins: times that are among them.
     """
-    count = int(min(most / 4, plan.duration / _FIRST)) + 2
+    count = int(min(most / 4, plan.duration / _MAX_FIRST_STEP)) + 2
     t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
     a, b = t[:-1], t[1:]  # intervals that may be divided
     errors = _drawn_error(arm, plan, a, b)

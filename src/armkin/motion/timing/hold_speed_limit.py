@@ -10,7 +10,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, interval_parts
-from armkin.motion.timing.trajectory import BRAKE
+from armkin.motion.timing.trajectory import BRAKE_SHARE
 from armkin.motors import motor_accel
 
 if TYPE_CHECKING:
@@ -20,11 +20,11 @@ if TYPE_CHECKING:
 def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
     """Greatest x at which a hold on the path asks no joint for more than `share` of its max_accel: (N,).
 
-    On a hold the board lets the leading motor m (the one with the longest way to a stop) slow down with BRAKE of its
-    greatest acceleration, b = BRAKE a_m, along the path: u = -b / |n'_m| - n''_m x / n'_m, and a joint then
+    On a hold the board lets the leading motor m (the one with the longest way to a stop) slow down with BRAKE_SHARE of
+    its greatest acceleration, b = BRAKE_SHARE a_m, along the path: u = -b / |n'_m| - n''_m x / n'_m, and a joint then
     accelerates with -q'_j b / |n'_m| + x (q''_j - q'_j n''_m / n'_m). The two parts have their signs: where the path
     bends a joint forward and the hold slows it down they take from each other. At x = 0 the first is at most
-    BRAKE max_accel, so that what is kept at x is kept on the whole way down to rest.
+    BRAKE_SHARE max_accel, so that what is kept at x is kept on the whole way down to rest.
     """
     parts = [
         _part_cap(arm, Knots(path.s[a : b + 1], path.q[a : b + 1], path.d[a : b + 1]), share)
@@ -38,7 +38,7 @@ def hold_cap(arm: Arm, path: Knots, share: float) -> Array:
 def _part_cap(arm: Arm, path: Knots, share: float) -> Array:
     """`hold_cap` of a part of the way."""
     gain = arm.motor_gain
-    brakes = BRAKE * motor_accel(arm)
+    brakes = BRAKE_SHARE * motor_accel(arm)
     ends = path.second_derivatives()
     caps = np.full(len(path.s), np.inf)
     rate = path.d @ gain.T

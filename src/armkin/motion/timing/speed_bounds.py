@@ -14,7 +14,7 @@ from armkin.motion.timing.speed_scan import Least, backward_step, concatenate_le
 
 TINY = 1e-300  # floor of a divisor: it keeps a quotient finite where the divisor is zero
 _AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
-_PAIRS = 4096  # intervals whose rows are compared pair by pair at once
+_BLOCK_INTERVALS = 4096  # intervals whose rows are compared pair by pair at once
 
 Intervals = slice | Int  # of the intervals
 
@@ -152,8 +152,8 @@ def _largest_feasible(cap: Array, slope: Array, level: Array) -> Array:
     surely = lowest < highest - 1e-9 * np.abs(highest)  # cap itself leaves room for u
     close = (~surely).nonzero()[0]
     i, j = _index_pairs(len(slope))
-    for begin in range(0, len(close), _PAIRS):
-        rows = close[begin : begin + _PAIRS]
+    for begin in range(0, len(close), _BLOCK_INTERVALS):
+        rows = close[begin : begin + _BLOCK_INTERVALS]
         sl, lv = slope.take(rows, axis=1), level.take(rows, axis=1)
         crossing = (lv.take(i, axis=0) + lv.take(j, axis=0)) / np.abs(sl.take(i, axis=0) - sl.take(j, axis=0))
         feasible[rows] = np.fmin(feasible[rows], np.fmin.reduce(crossing, axis=0, initial=np.inf))

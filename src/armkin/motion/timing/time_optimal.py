@@ -26,13 +26,13 @@ from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, interval_parts
 
-_NEIGHBOURS = 5  # samples that give a slope
-_SECTIONS = 16  # sections of samples between breaks from which on they are worked on together
-_UNBOUNDED = 1e18  # bound of x where nothing bounds it
-_EXCESS = 1.001  # factor, at most, on an acceleration, or on a speed squared, between grid points
+_SLOPE_SAMPLES = 5  # samples that give a slope
+_MIN_SECTIONS = 16  # sections of samples between breaks from which on they are worked on together
+_UNBOUNDED_X = 1e18  # bound of x where nothing bounds it
+_EXCESS_FACTOR = 1.001  # factor, at most, on an acceleration, or on a speed squared, between grid points
 _SMALL_EXCESS = 1.0002  # factor up to which an excess is left as it is: most of the others are above 1 by rounding
-_ROUNDS = 8  # rounds, at most, in which excesses are taken away
-_SHARED = 2  # rounds in which an interval is given less acceleration; then it is passed slower
+_MAX_ROUNDS = 8  # rounds, at most, in which excesses are taken away
+_SHARED_ROUNDS = 2  # rounds in which an interval is given less acceleration; then it is passed slower
 _FEW_SAMPLES = 400  # samples of a way up to which the law needs more grid points
 
 
@@ -53,7 +53,7 @@ def knots_of_samples(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequ
     """
     N = len(s)
     edges = np.unique([0, N - 1, *breaks])
-    if len(rests) or (len(edges) > _SECTIONS and np.diff(edges).min() >= _NEIGHBOURS - 1):
+    if len(rests) or (len(edges) > _MIN_SECTIONS and np.diff(edges).min() >= _SLOPE_SAMPLES - 1):
         return _knots_in_sections(s, q, edges, np.isin(edges[1:-1], rests))
     total, count = np.zeros_like(q), np.zeros(N)
     for lo, hi in pairwise(edges.tolist()):
@@ -90,7 +90,7 @@ def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
     Barycentric: q'(x_i) = sum_j (l_j / l_i) (q_j - q_i) / (x_i - x_j), l_j = 1 / prod_m (x_j - x_m)
     (Berrut and Trefethen, Barycentric Lagrange interpolation, 2004, section 9).
     """
-    w = min(_NEIGHBOURS, int((last - first).min(initial=_NEIGHBOURS)) + 1)
+    w = min(_SLOPE_SAMPLES, int((last - first).min(initial=_SLOPE_SAMPLES)) + 1)
     neighbours = np.clip(i - w // 2, first, last + 1 - w) + np.arange(w)[:, None]  # (w, m)
     x = s[neighbours]
     inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
@@ -138,7 +138,7 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
     down for, from rest to rest.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
-        cap = np.minimum(bounds.cap, _UNBOUNDED)
+        cap = np.minimum(bounds.cap, _UNBOUNDED_X)
         speed = np.broadcast_to(bounds.speed, path.q.shape)
         for points in interval_parts(len(cap)):
             rate = np.ascontiguousarray((speed[points] / np.maximum(np.abs(path.d[points]), TINY)).T).min(axis=0)
@@ -149,12 +149,12 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
         limits = Bound(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
         law = Fastest(limits, cap)
         worst, moved = np.ones(len(path.h)), np.arange(len(path.h))
-        for round_ in range(_ROUNDS):
+        for round_ in range(_MAX_ROUNDS):
             for part in interval_parts(len(moved)):
-                worst[moved[part]] = _lower_law(law, limits, speed, moved[part], share=round_ < _SHARED)
-            if worst.max() <= _EXCESS:
+                worst[moved[part]] = _lower_law(law, limits, speed, moved[part], share=round_ < _SHARED_ROUNDS)
+            if worst.max() <= _EXCESS_FACTOR:
                 return law.x
-            if round_ < _ROUNDS - 1:
+            if round_ < _MAX_ROUNDS - 1:
                 bad, x = np.flatnonzero(worst > _SMALL_EXCESS), law.x
                 law.lower_speeds(_add_neighbours(bad, len(worst)))
                 gone = law.x != x

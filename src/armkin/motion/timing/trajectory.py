@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MAX_SECONDS = 86_400  # length [s], at most, of a trajectory: a day
-BRAKE = 0.625  # share of the motors' accelerations with which a board stops on a curve
+BRAKE_SHARE = 0.625  # share of the motors' accelerations with which a board stops on a curve
 
 
 class Stretch(Protocol):
@@ -76,7 +76,7 @@ class Straight:
 
 def brake_share(stretch: Stretch) -> float:
     """Share of the motors' accelerations with which a board stops on a stretch: all on a straight line."""
-    return 1.0 if isinstance(stretch, Straight) else BRAKE
+    return 1.0 if isinstance(stretch, Straight) else BRAKE_SHARE
 
 
 @dataclass(frozen=True)

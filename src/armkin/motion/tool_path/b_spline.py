@@ -14,9 +14,9 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 
-_RIDGE = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
-_ENDS = 1e6  # weight of a curve's ends, which it passes
-_DENSE = 16  # blocks up to which they are solved as one system
+_BEND_WEIGHT = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
+_END_WEIGHT = 1e6  # weight of a curve's ends, which it passes
+_DENSE_BLOCKS = 16  # blocks up to which they are solved as one system
 _THIRDS = np.arange(4) / 3
 _TO_POWERS = np.linalg.inv(np.vander(_THIRDS, increasing=True))  # values at thirds -> coefficients
 
@@ -75,7 +75,7 @@ class Layout:
 def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
     """Control points (C, d) of the curves nearest to points y (N, d), weighted (N,); ends (N,): points to pass."""
     N, first = layout.basis, layout.first
-    w = np.where(ends, _ENDS, weight)
+    w = np.where(ends, _END_WEIGHT, weight)
     columns = np.ascontiguousarray(y.T)
     bands = np.zeros((4, layout.count))
     right = np.zeros((layout.count, y.shape[1]))
@@ -103,7 +103,7 @@ def _add_ridge(layout: Layout, bands: Array) -> None:
         rows = layout.control[used] + k
         for i in range(3):
             for j in range(i, 3):
-                bands[j - i] += _RIDGE * np.bincount(rows + i, row[:, i] * row[:, j], layout.count)
+                bands[j - i] += _BEND_WEIGHT * np.bincount(rows + i, row[:, i] * row[:, j], layout.count)
 
 
 def _basis(t: Array, u: Array) -> Array:
@@ -154,7 +154,7 @@ def _solve_block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
     D: (M, k, k); U: (M - 1, k, k) blocks beside the diagonal; b: (M, k, d) -> (M, k, d).
     """
     k, m = D.shape[1], len(D) // 2  # size of blocks, blocks that go
-    if len(D) <= _DENSE:
+    if len(D) <= _DENSE_BLOCKS:
         matrix, i = np.zeros((len(D), k, len(D), k)), np.arange(len(D))
         matrix[i, :, i], matrix[i[:-1], :, i[1:]], matrix[i[1:], :, i[:-1]] = D, U, U.swapaxes(1, 2)
         return np.asarray(np.linalg.solve(matrix.reshape(len(D) * k, -1), b.reshape(len(D) * k, -1)).reshape(b.shape))

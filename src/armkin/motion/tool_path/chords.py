@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 
-CORNER = np.deg2rad(20.0)  # angle [rad] of a turn, above which it is rounded
+CORNER_ANGLE = np.deg2rad(20.0)  # angle [rad] of a turn, above which it is rounded
 SHORT_SHARE = 1 / 3  # share of a chord: a shorter neighbour tells nothing of its curvature
 _SAME_POINT = 1e-6  # distance [mm] of points that are one
 
@@ -52,7 +52,7 @@ class Chords:
         for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
             half = np.minimum(0.5 * L[chord] * bend, 1.0)
             rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
-            tells = (turned <= CORNER) & (L[neighbour] >= SHORT_SHARE * L[chord])
+            tells = (turned <= CORNER_ANGLE) & (L[neighbour] >= SHORT_SHARE * L[chord])
             rise_of_chord[chord] = np.maximum(rise_of_chord[chord], np.where(tells, rise, 0.0))
         return rise_of_chord
 

@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Int
 from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.chords import distinct_points, turn_angles
-from armkin.motion.tool_path.fit_points import REVERSAL, FittedCurves, fit_curves
+from armkin.motion.tool_path.fit_points import REVERSAL_ANGLE, FittedCurves, fit_curves
 from armkin.motion.tool_path.path_pieces import (
     Dense,
     Piece,
@@ -29,8 +29,8 @@ from armkin.motion.tool_path.path_pieces import (
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
 
-FIT = 0.94  # share of the tolerance from points to curve (from chords to curve: less, see `fit_points`)
-PLAN = (0.1, 0.05, 0.02)  # shares of the tolerance from curve to motion: the first that holds for all points is taken
+FIT_SHARE = 0.94  # share of the tolerance from points to curve (from chords to curve: less, see `fit_points`)
+PLAN_SHARES = (0.1, 0.05, 0.02)  # shares of it from curve to motion: the first that holds for all points is taken
 _AT_ONCE = 8192  # points, about, that are fitted together
 _FARTHEST_TURN = 5.0  # turn [rad], at most, that rotation vectors tell from less
 _NAN = float("nan")
@@ -73,7 +73,7 @@ class Polyline:
         passed = distinct_points(y)
         if len(passed) == 1:  # no way at all, which is refused of the whole route
             return self._lines(spots, speeds)
-        back = 1 + np.flatnonzero(turn_angles(y[passed]) > REVERSAL) if len(passed) > 2 else np.zeros(0, int)
+        back = 1 + np.flatnonzero(turn_angles(y[passed]) > REVERSAL_ANGLE) if len(passed) > 2 else np.zeros(0, int)
         ends = np.concatenate([[0], back, [len(passed) - 1]])
         turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
         made: list[Piece] = []
@@ -162,7 +162,7 @@ def _fit_block(
         return [_line_between(task, spots, numbers, speeds)]
     moving = (y != y[0]).any(axis=0)  # the others stay
     scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
-    curve: FittedCurves = fit_curves(y[:, moving], FIT * tolerance, stop)
+    curve: FittedCurves = fit_curves(y[:, moving], FIT_SHARE * tolerance, stop)
     still = np.where(moving, 0.0, y[0] / weights(task))
 
     def curve_at(v: Array) -> tuple[Array, Array]:

@@ -15,14 +15,14 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout
-from armkin.motion.tool_path.chords import CORNER, Chords, turn_angles
+from armkin.motion.tool_path.chords import CORNER_ANGLE, Chords, turn_angles
 from armkin.motion.tool_path.least_knots import Rows, least_knots
 
-REVERSAL = np.deg2rad(160.0)  # turn [rad] from which on a corner is a stop
-_SCALES = (4.0, 16.0)  # distances [tolerances] from which a corner is still one, and a recorder's noise is none
+REVERSAL_ANGLE = np.deg2rad(160.0)  # turn [rad] from which on a corner is a stop
+_CORNER_DISTANCES = (4.0, 16.0)  # distances [tolerances] from which a corner is still one, a recorder's noise none
 _SAME_TURN = 0.1  # difference [rad] of turns that are the same
 _INNER_PLACES = 6  # places of each cubic that are held to its chords in the end
-_TRIES = 5  # tries after which a curve that leaves its chords is given up
+_MAX_TRIES = 5  # tries after which a curve that leaves its chords is given up
 
 
 @dataclass(frozen=True)
@@ -55,13 +55,13 @@ def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
     """
     corner = np.zeros(len(y), bool)
     near = turn_angles(y)
-    sharp = np.flatnonzero(near > CORNER) + 1
+    sharp = np.flatnonzero(near > CORNER_ANGLE) + 1
     length = np.linalg.norm(np.diff(y, axis=0), axis=1)
-    sure = np.minimum(length[sharp - 1], length[sharp]) >= _SCALES[0] * tolerance
+    sure = np.minimum(length[sharp - 1], length[sharp]) >= _CORNER_DISTANCES[0] * tolerance
     alike = np.ones(len(sharp), bool)
     u = np.concatenate([[0.0], np.cumsum(length)])
     ends = np.array([0, len(y) - 1]) if stop is None else np.flatnonzero(stop)
-    for distance in _SCALES if len(sharp) else ():
+    for distance in _CORNER_DISTANCES if len(sharp) else ():
         next_ = np.searchsorted(ends, sharp, side="right")
         before = np.maximum(u[sharp] - np.maximum(distance * tolerance, length[sharp - 1]), u[ends[next_ - 1]])
         after = np.minimum(u[sharp] + np.maximum(distance * tolerance, length[sharp]), u[ends[next_]])
@@ -69,8 +69,8 @@ def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
             np.stack([np.interp(places, u, y[:, k]) for k in range(y.shape[1])], axis=1) for places in (before, after)
         ]
         far = turn_angles(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
-        alike = (alike & (np.abs(far - near[sharp - 1]) < _SAME_TURN))[far > CORNER]
-        sharp, sure = sharp[far > CORNER], sure[far > CORNER]
+        alike = (alike & (np.abs(far - near[sharp - 1]) < _SAME_TURN))[far > CORNER_ANGLE]
+        sharp, sure = sharp[far > CORNER_ANGLE], sure[far > CORNER_ANGLE]
     # beside chords too short to tell a direction one that is not as sharp from near as from afar is a tight bend and
     # noise, if a curve passes it
     corner[sharp[sure | alike]] = True
@@ -87,16 +87,16 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     chords = Chords(y, corner_points(y, tolerance, stop))
     stop = np.zeros(len(y), bool) if stop is None else stop
     used, parts = np.ones(len(y) - 1, bool), []
-    for round_ in range(_TRIES + 1):
+    for round_ in range(_MAX_TRIES + 1):
         begin, end, powers, missed = _fit_cubics(chords, used, tolerance)
         # where cubics waver between the points rounded chords take their place; in the last round all of a curve
         again = _chords_of_curves(chords, missed)
-        final = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _TRIES)
+        final = ~again[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (round_ == _MAX_TRIES)
         parts.append((begin[final], end[final], powers[final]))
-        if not again.any() or round_ == _TRIES:
+        if not again.any() or round_ == _MAX_TRIES:
             break
         inside = np.concatenate([[False], again[1:] & again[:-1] & ~chords.corner[1:-1], [False]])
-        used, chords = again, Chords(y, chords.corner | (missed if round_ + 1 < _TRIES else inside))
+        used, chords = again, Chords(y, chords.corner | (missed if round_ + 1 < _MAX_TRIES else inside))
     begin, end, powers = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
     order = np.argsort(begin, kind="stable")
     begin, end, powers = begin[order], end[order], powers[order]

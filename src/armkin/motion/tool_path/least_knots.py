@@ -10,13 +10,13 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout, least_squares
 from armkin.motion.tool_path.chords import SHORT_SHARE, Chords
 
-_CHORD = 0.85  # A curve beside chords is allowed this share of the tolerance.
+_CHORD_SHARE = 0.85  # A curve beside chords is allowed this share of the tolerance.
 _EVEN_PARTS = 8  # A chord that is long beside a neighbour is divided into so many parts.
-_SPARE = 0.98  # A fit is held to this share of the allowed misfit, so that rounding stays within it.
-_POINTS, _MAX_LENGTH = 32, 20.0  # A first interval has at most so many points and so many mm.
-_ROUNDS = 80  # The intervals are divided in at most so many rounds.
-_MIN_COUNT, _NOISE = 5, 0.05  # So many points tell misfit from noise; this share of what is allowed is none.
-_PATIENCE = 4  # Points are weighed in so many rounds before an interval is divided.
+_MISFIT_SHARE = 0.98  # A fit is held to this share of the allowed misfit, so that rounding stays within it.
+_MAX_POINTS, _MAX_LENGTH = 32, 20.0  # A first interval has at most so many points and so many mm.
+_MAX_ROUNDS = 80  # The intervals are divided in at most so many rounds.
+_MIN_COUNT, _NOISE_SHARE = 5, 0.05  # So many points tell misfit from noise; this share of what is allowed is none.
+_WEIGHING_ROUNDS = 4  # Points are weighed in so many rounds before an interval is divided.
 _MAX_WEIGHT = 1e6  # A point has at most this weight.
 _HOPELESS_MISFIT = 2.5  # A misfit of so many times what is allowed needs a division: weights do not help.
 
@@ -64,7 +64,7 @@ class Rows:
             u,
             np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),  # long runs of numbers
             curve,
-            _SPARE * np.where(is_point, tolerance, _CHORD * tolerance + chords.sagitta[numbers]),
+            _MISFIT_SHARE * np.where(is_point, tolerance, _CHORD_SHARE * tolerance + chords.sagitta[numbers]),
             heavy,
             np.asfortranarray(np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])),
             np.where(is_point, numbers + (share == 1), -1),
@@ -120,11 +120,11 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     """Splines of few knots through rows: layout, control points, and how far they leave the rows (R,)."""
     first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
     inside = np.arange(len(rows.u)) - first[rows.curve]
-    block = np.floor(np.minimum(inside / (2 * _POINTS), (rows.u - rows.u[first][rows.curve]) / _MAX_LENGTH))
+    block = np.floor(np.minimum(inside / (2 * _MAX_POINTS), (rows.u - rows.u[first][rows.curve]) / _MAX_LENGTH))
     knot = rows.ends | np.append(False, np.diff(block) > 0)
     weight, age = rows.weight.copy(), np.zeros(len(knot), int)  # age: rounds since an interval was divided, at its knot
     at_work, index = rows, np.arange(len(knot))
-    for _ in range(_ROUNDS - 1):
+    for _ in range(_MAX_ROUNDS - 1):
         layout = Layout.from_points(at_work.u, at_work.curve, knot[index])
         control = least_squares(layout, at_work.y, weight[index], at_work.ends)
         miss = at_work.miss(layout.values(control))
@@ -154,7 +154,7 @@ def _refine_intervals(
     begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
     knots = np.flatnonzero(knot)
     mine = knots[np.searchsorted(knots, begins[:-1])]
-    divide = astray | (worst > _HOPELESS_MISFIT) | ((worst > 1.0) & (age[mine] >= _PATIENCE))
+    divide = astray | (worst > _HOPELESS_MISFIT) | ((worst > 1.0) & (age[mine] >= _WEIGHING_ROUNDS))
     age[mine[worst > 1.0]] += 1
     middle = (begins[:-1] + begins[1:]) // 2
     can = divide & (middle > begins[:-1]) & ~knot[middle]
@@ -179,6 +179,5 @@ def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) ->
     size = np.bincount(interval, (miss_a**2).sum(axis=0), M)
     counts = np.bincount(interval, minlength=M)
     weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # intervals that miss the others for a few
-    return np.asarray(
-        ~weighed & (counts >= _MIN_COUNT) & (like > 0.5 * size) & (size > counts * (_NOISE * rows.tolerance[0]) ** 2)
-    )
+    noise = _NOISE_SHARE * rows.tolerance[0]
+    return np.asarray(~weighed & (counts >= _MIN_COUNT) & (like > 0.5 * size) & (size > counts * noise**2))

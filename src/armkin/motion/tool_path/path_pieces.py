@@ -25,9 +25,9 @@ from armkin.motion.tool_path.b_spline import solve_banded
 
 PER_RADIAN = 30.0  # lever [mm/rad] at which a turn of the tool counts as a way
 MIN_LENGTH = 1e-9  # length [mm] below which a piece is none
-_GAUSS = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
-_TABLE, _MIN_TABLE = 96, 4  # intervals of a curved span's table of lengths, with few spans and with many
-_TABLES = 20_000  # intervals of all spans' tables
+_GAUSS_NODES = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
+_TABLE_INTERVALS, _MIN_TABLE_INTERVALS = 96, 4  # intervals of a curved span's lengths, with few spans and many
+_ALL_TABLE_INTERVALS = 20_000  # intervals of all spans' tables
 _EVEN_SLOPE, _LENGTH_ERROR = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
 
 
@@ -307,7 +307,7 @@ def unit_speed_piece(
     scale = weights(task)
     grid = np.append(divide_spans(u, _table_sizes(curve, u, scale)), u[-1])
     step = np.diff(grid)
-    nodes = grid[:-1, None] + step[:, None] * _GAUSS
+    nodes = grid[:-1, None] + step[:, None] * _GAUSS_NODES
     speed = np.linalg.norm(curve(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
     s = np.concatenate([[0.0], np.cumsum(speed.mean(axis=1) * step)])
     y, left = curve(grid)
@@ -340,12 +340,12 @@ def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale:
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
     needed = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
     even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * most
-    return np.where(even, 1, np.clip(needed, _MIN_TABLE, _table_intervals(len(u) - 1))).astype(np.intp)
+    return np.where(even, 1, np.clip(needed, _MIN_TABLE_INTERVALS, _table_intervals(len(u) - 1))).astype(np.intp)
 
 
 def _table_intervals(spans: int) -> int:
     """Number of intervals of the table of lengths for each of so many spans."""
-    return int(np.clip(_TABLES // max(spans, 1), _MIN_TABLE, _TABLE))
+    return int(np.clip(_ALL_TABLE_INTERVALS // max(spans, 1), _MIN_TABLE_INTERVALS, _TABLE_INTERVALS))
 
 
 def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.timing.trajectory import group_numbers
-from armkin.motion.tool_path.fit_points import REVERSAL
+from armkin.motion.tool_path.fit_points import REVERSAL_ANGLE
 from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Dense, Piece, blend
 
 _ONE_BREAK = 1e-6  # distance [mm] of breaks that are one
@@ -200,7 +200,7 @@ def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | N
     """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `join_pieces`'s blends."""
     # a cubic blend passes its corner at r |a - b| / 4
     radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
-    sharpest = REVERSAL if wish is None else np.pi - _SMOOTH_ANGLE
+    sharpest = REVERSAL_ANGLE if wish is None else np.pi - _SMOOTH_ANGLE
     return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 
