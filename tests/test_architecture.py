@@ -318,6 +318,14 @@ def test_no_two_files_share_a_name() -> None:
     assert not twice
 
 
+def test_no_file_has_the_name_of_a_folder() -> None:
+    """But that of a folder that it stands in, as board/backend/board.py."""
+    files = [path.relative_to(SOURCE / "armkin") for path in MODULES.values() if path.stem != "__init__"]
+    folders = {name for file in files for name in file.parent.parts}
+    given = {file for file in files if file.parent.as_posix() in NAMES_ARE_GIVEN}
+    assert not [file for file in files if file.stem in folders - set(file.parent.parts) and file not in given]
+
+
 def test_every_class_and_public_function_has_a_docstring() -> None:
     """Methods, too, those of private classes included; a setter's is its property's."""
     silent = {

@@ -28,7 +28,7 @@ from armkin.inverse.redundant.families import families
 from armkin.inverse.run.workers import check_workers, share_rows
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundant import redundancy
+from armkin.inverse.solvers.redundancy import redundancy
 from armkin.inverse.tasks.choose_task import default_task
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.model.arm import actual_arm

@@ -56,7 +56,7 @@ def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
 
 def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
-    from armkin.inverse.solvers.redundant import redundancy
+    from armkin.inverse.solvers.redundancy import redundancy
     from armkin.motion.path_planner.redundant_joint import values_to_hold
 
     spare = redundancy(arm, file.task)

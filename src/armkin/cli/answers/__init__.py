@@ -1,21 +1,23 @@
 """The JSON of every command: keys, types and what they mean.
 
-kinematics.py        answers about an arm, and errors; branches.py: those of ik; calibration.py: of calibrate
-motion_and_board.py  answers about an arm that moves, and about its board
+kinematics.py           answers about an arm, and errors
+branch_answers.py       answers of ik
+calibration_answers.py  answers of calibrate
+motion_and_board.py     answers about an arm that moves, and about its board
 
 `docs/json.md` is written from these types (scripts/json_docs.py); a test holds the two equal, and the
 commands' real answers to the types. Millimetres and degrees throughout; no NaN and no infinity.
 """
 
-from armkin.cli.answers.branches import Branch as Branch
-from armkin.cli.answers.branches import Closest as Closest
-from armkin.cli.answers.branches import Family as Family
-from armkin.cli.answers.branches import Ik as Ik
-from armkin.cli.answers.calibration import Calibrate as Calibrate
-from armkin.cli.answers.calibration import Correction as Correction
-from armkin.cli.answers.calibration import Errors as Errors
-from armkin.cli.answers.calibration import Flagged as Flagged
-from armkin.cli.answers.calibration import Suggested as Suggested
+from armkin.cli.answers.branch_answers import Branch as Branch
+from armkin.cli.answers.branch_answers import Closest as Closest
+from armkin.cli.answers.branch_answers import Family as Family
+from armkin.cli.answers.branch_answers import Ik as Ik
+from armkin.cli.answers.calibration_answers import Calibrate as Calibrate
+from armkin.cli.answers.calibration_answers import Correction as Correction
+from armkin.cli.answers.calibration_answers import Errors as Errors
+from armkin.cli.answers.calibration_answers import Flagged as Flagged
+from armkin.cli.answers.calibration_answers import Suggested as Suggested
 from armkin.cli.answers.kinematics import BestPlace as BestPlace
 from armkin.cli.answers.kinematics import Error as Error
 from armkin.cli.answers.kinematics import Export as Export

@@ -17,13 +17,13 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundant import held_by_near, redundancy
+from armkin.inverse.solvers.redundancy import held_by_near, redundancy
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED
 from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
-    from armkin.inverse.solvers.redundant import Redundancy
+    from armkin.inverse.solvers.redundancy import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 

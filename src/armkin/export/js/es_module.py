@@ -19,7 +19,7 @@ from armkin.export.js import js_elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundant import redundancy
+from armkin.inverse.solvers.redundancy import redundancy
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock
@@ -28,7 +28,7 @@ from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
-    from armkin.inverse.solvers.redundant import Redundancy
+    from armkin.inverse.solvers.redundancy import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 

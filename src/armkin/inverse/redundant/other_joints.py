@@ -24,7 +24,7 @@ from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundant import Redundancy, moved, moved_entries
+from armkin.inverse.solvers.redundancy import Redundancy, moved, moved_entries
 from armkin.model.arm import Arm
 
 Ik = Callable[..., Solutions]
