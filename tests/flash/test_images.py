@@ -176,7 +176,7 @@ def test_a_boot_loader_that_was_called_twice_and_is_silent_is_called_anew(
             reply = {b"\x30\x20": b"\x14\x10", b"\x75\x20": b"\x14\x1e\x95\x0f\x10"}[data]
             self.left = b"" if data[0] == 0x75 and self.resets <= silent else reply
 
-    monkeypatch.setattr(stk500v1, "_ANSWER", 0.01)
+    monkeypatch.setattr(stk500v1, "_ANSWER_TIMEOUT", 0.01)
     port = Late(b"")
     heard = upload_firmware._identify_chip(Stk500v1, cast(SerialPort, port))
     assert (heard is not None, port.resets) == (is_found, min(silent + 1, 3))

@@ -17,7 +17,7 @@ from armkin.compiled import toolchain
 SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
 MIN_EXP, MAX_EXP = -292, 324  # powers of ten, least and greatest, that doubles need
 MAX_WIDTH = 25  # characters of a number: -2.2250738585072014e-308
-SPARE = 64  # characters behind the last one that C may write
+SPARE_CHARACTERS = 64  # characters behind the last one that C may write
 BLOCK_ROWS = 4_096  # rows printed at once: their text stays in the cache
 
 
@@ -31,7 +31,7 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
     ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
     first = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
     width = sum(map(len, between)) + len(table) * max(MAX_WIDTH, *map(len, flat))
-    words, buffer = b"".join(flat), np.empty(min(count, BLOCK_ROWS) * width + SPARE, np.uint8)
+    words, buffer = b"".join(flat), np.empty(min(count, BLOCK_ROWS) * width + SPARE_CHARACTERS, np.uint8)
     printed = []
     for start in range(0, count, BLOCK_ROWS):
         block = take_rows(table, slice(start, start + BLOCK_ROWS))

@@ -24,7 +24,7 @@ Result = TypeVar("Result")
 
 REACHED = 1.5  # time [s] until an address is given up to which no connection comes about
 SECONDS = 10  # time [s] until a scheduler is given up that took the connection but does not answer, or has no worker
-AHEAD = 3  # chunks sent ahead to each thread of the workers
+CHUNKS_AHEAD = 3  # chunks sent ahead to each thread of the workers
 
 
 def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
@@ -40,13 +40,13 @@ def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunk
 
 
 def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> Iterator[Any]:
-    """The chunks' answers in their order; `AHEAD` chunks for each thread, at least two, are on the cluster."""
+    """The chunks' answers in their order; `CHUNKS_AHEAD` chunks for each thread, at least two, are on the cluster."""
     waiting: deque[Any] = deque()
     name = hashlib.sha256(data).hexdigest()
     while True:
         try:
             threads = sum(client.nthreads().values()) if not waiting else 0
-            window = max(AHEAD * threads, 2, len(waiting))
+            window = max(CHUNKS_AHEAD * threads, 2, len(waiting))
             while len(waiting) < window and (chunk := next(source, waiting)) is not waiting:
                 waiting.append(client.submit(_run_chunk, data, name, chunk, pure=False))
             if not waiting:

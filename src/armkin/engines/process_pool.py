@@ -21,7 +21,7 @@ from armkin.errors import ClusterError
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
-AHEAD = 2  # chunks for each process that wait for it, or for those before them
+CHUNKS_AHEAD = 2  # chunks for each process that wait for it, or for those before them
 PATIENCE = 3  # times that the process of one chunk may end before the run ends
 
 _job: tuple[Callable[[Any, Any], Any], Any] | None = None
@@ -34,7 +34,7 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
     pool, lost = _start_pool(workers, work, job), 0
     try:
         while True:
-            while len(waiting) < AHEAD * workers and (next_chunk := next(source, waiting)) is not waiting:
+            while len(waiting) < CHUNKS_AHEAD * workers and (next_chunk := next(source, waiting)) is not waiting:
                 waiting.append((next_chunk, _submit(pool, next_chunk)))  # type: ignore[arg-type]
             if not waiting:
                 return

@@ -10,7 +10,7 @@ from armkin.errors import LinkError
 _SYNC, _LEAVE, _SIGNATURE = 0x30, 0x51, 0x75
 _ADDRESS, _WRITE, _READ = 0x55, 0x64, 0x74
 _END, _IN_SYNC, _OK = 0x20, 0x14, 0x10
-_ANSWER = 1.0  # time [s] that an answer may take; a page takes 5 ms to be written
+_ANSWER_TIMEOUT = 1.0  # time [s] that an answer may take; a page takes 5 ms to be written
 
 
 class Stk500v1:
@@ -55,7 +55,7 @@ class Stk500v1:
 
     def _ask(self, request: bytes, count: int = 0) -> bytes:
         self._port.write(request + bytes([_END]))
-        answer = self._take(count + 2, _ANSWER)
+        answer = self._take(count + 2, _ANSWER_TIMEOUT)
         if len(answer) != count + 2 or answer[0] != _IN_SYNC or answer[-1] != _OK:
             raise LinkError(f"the boot loader answered {answer.hex(' ') or 'nothing'}")
         return answer[1:-1]

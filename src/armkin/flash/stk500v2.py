@@ -14,7 +14,7 @@ _SIGN_ON, _ENTER, _LEAVE = 0x01, 0x10, 0x11
 _ADDRESS, _WRITE, _READ = 0x06, 0x13, 0x14
 _SIGNATURE = 0x1B
 _BEYOND_64K = 1 << 31
-_ANSWER = 1.0  # time [s] that an answer may take
+_ANSWER_TIMEOUT = 1.0  # time [s] that an answer may take
 
 
 class Stk500v2:
@@ -60,7 +60,7 @@ class Stk500v2:
         words = address // 2 | (_BEYOND_64K if address >= 1 << 16 else 0)
         self._ask(bytes([_ADDRESS, *words.to_bytes(4, "big")]))
 
-    def _ask(self, body: bytes, timeout: float = _ANSWER) -> bytes:
+    def _ask(self, body: bytes, timeout: float = _ANSWER_TIMEOUT) -> bytes:
         """The answer's bytes after the command and its status."""
         self._number = (self._number + 1) & 255
         message = bytes([_START, self._number, *len(body).to_bytes(2, "big"), _TOKEN]) + body

@@ -24,7 +24,7 @@ _SIGNATURES = {
     bytes.fromhex("1e9516"): "atmega328p",  # the 328PB
     bytes.fromhex("1e9801"): "atmega2560",
 }
-_LISTENS = 1.6  # time [s] after a reset in which a boot loader is asked for
+_LISTEN_TIME = 1.6  # time [s] after a reset in which a boot loader is asked for
 _CALLS = 3  # resets after which a boot loader that answers and then says no more is given up
 _TO_BOOT_DRIVE = 1200  # rate [bit/s]: opening its port so sends a Pico to its boot drive
 _RESTART = 10.0  # time [s] that a Pico may take to show its serial port again
@@ -106,7 +106,7 @@ def _identify_chip(make: type[Stk500v1] | type[Stk500v2], link: SerialPort) -> t
     for _ in range(_CALLS):
         link.restart()
         loader = make(link)
-        if not loader.answers(time.monotonic() + _LISTENS):
+        if not loader.answers(time.monotonic() + _LISTEN_TIME):
             return None
         with suppress(LinkError):
             return loader, loader.signature()

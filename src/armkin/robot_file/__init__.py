@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 
-_TOLD = 20  # problems of one file that are told at once
+_MAX_PROBLEMS = 20  # problems of one file that are told at once
 
 
 def read_robot_file(path: str | os.PathLike[str]) -> RobotFile:
@@ -122,9 +122,9 @@ def _with_line(name: str, line: int, text: str) -> str:
 def _invalid_error(name: str, problems: list[tuple[int, str]]) -> RobotFileError:
     """All problems, a line each; of very many, the first and how many more there are."""
     lines = tuple(_with_line(name, line, text) for line, text in problems)
-    message = "\n".join(lines[:_TOLD])
-    if len(lines) > _TOLD:
-        message += f"\nand {len(lines) - _TOLD} more problems"
+    message = "\n".join(lines[:_MAX_PROBLEMS])
+    if len(lines) > _MAX_PROBLEMS:
+        message += f"\nand {len(lines) - _MAX_PROBLEMS} more problems"
     return RobotFileError(message, file=name, line=problems[0][0] or None, problems=list(lines))
 
 

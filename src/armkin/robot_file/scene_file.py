@@ -15,7 +15,7 @@ from armkin.robot_file.key_types import Model
 from armkin.robot_file.robot_keys import KeepOut, Size
 
 _KIND = strict_yaml.Kind("scene", "keep_out", "keep_out: [self, floor: 0]", 1024 * 1024, 50_000)
-_TOLD = 20  # problems that are told at once
+_MAX_PROBLEMS = 20  # problems that are told at once
 
 
 class Scene(Model):
@@ -86,5 +86,7 @@ def _place_text(path: strict_yaml.Path) -> str:
 def _refuse(name: str, problems: list[tuple[int, str]]) -> NoReturn:
     problems.sort(key=lambda problem: problem[0])
     lines = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in problems]
-    more = f"\nand {len(lines) - _TOLD} more problems" if len(lines) > _TOLD else ""
-    raise RobotFileError("\n".join(lines[:_TOLD]) + more, file=name, line=problems[0][0] or None, problems=lines)
+    more = f"\nand {len(lines) - _MAX_PROBLEMS} more problems" if len(lines) > _MAX_PROBLEMS else ""
+    raise RobotFileError(
+        "\n".join(lines[:_MAX_PROBLEMS]) + more, file=name, line=problems[0][0] or None, problems=lines
+    )

@@ -33,7 +33,7 @@ METRE = 1000.0  # metre [mm]
 MAX_METRES = 1e4  # distance [m], at most, of anything from the base
 LARGE_METRES = 20.0  # distance [m] from base to tip that makes one ask
 TURNS = 25.0  # limit [rad] that makes one ask: four turns
-ENDLESS = 1e6  # limit [deg | mm] that is none
+NO_LIMIT = 1e6  # limit [deg | mm] that is none
 
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _ROUND = ("cylinder", "sphere", "capsule")  # collision shapes with a radius
@@ -197,8 +197,8 @@ def _limit_keys(name: str, low: float, high: float, unit: str, place: str, notes
     """Limits [deg | mm] and home of a joint; none where the URDF means none."""
     if low > high:
         raise RobotFileError(f"{place}: lower limit {low:g} {unit} is above upper limit {high:g} {unit}")
-    if max(-low, high) > ENDLESS:
-        notes.append(f"joint {name} has limits beyond {ENDLESS:.0f} {unit}: read as no limits")
+    if max(-low, high) > NO_LIMIT:
+        notes.append(f"joint {name} has limits beyond {NO_LIMIT:.0f} {unit}: read as no limits")
         return {}
     if low == high == 0:
         notes.append(f"joint {name} has limits 0 and 0: read as no limits")
