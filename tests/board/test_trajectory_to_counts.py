@@ -301,7 +301,7 @@ def test_a_line_is_the_same_made_in_blocks(monkeypatch: pytest.MonkeyPatch) -> N
     )
     once = list(line)
     assert len(once) == len(line) == straight_lines.segment_count(law, 90_001) > 40
-    monkeypatch.setattr(straight_lines, "_AT_ONCE", 3)
+    monkeypatch.setattr(straight_lines, "_MAX_BOUNDS", 3)
     assert list(line) == once
 
 

@@ -70,7 +70,7 @@ def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, mon
     at_once = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
     )
-    monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 50)
+    monkeypatch.setattr("armkin.motion.timing.speed_bounds._CHUNK_INTERVALS", 50)
     monkeypatch.setattr("armkin.board.firmware.segments.curve_segments._CHUNK_SAMPLES", 700)
     parts = cut_trajectory(
         round_waypoints(three_dof, rows[0], rows[1:], 5.0, hold=1.5), armkin.pulses(three_dof, rows[0])
@@ -85,7 +85,7 @@ def test_a_long_way_is_planned_in_parts_with_the_same_result(three_dof: Arm, mon
 
 def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monkeypatch: pytest.MonkeyPatch) -> None:
     """The way has 24 points of 7 numbers a waypoint: 1.3 kB. All rows of all points at once took 22."""
-    monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 1000)
+    monkeypatch.setattr("armkin.motion.timing.speed_bounds._CHUNK_INTERVALS", 1000)
 
     def peak(count: int) -> int:
         rows = random_waypoints(three_dof, count, 20.0)

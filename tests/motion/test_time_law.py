@@ -49,5 +49,5 @@ def test_a_long_way_takes_little_memory_beside_its_own() -> None:
 def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.MonkeyPatch) -> None:
     s, q = wave_samples(1, 500, 3)
     knots = knots_of_samples(s, q, (100, 250))
-    monkeypatch.setattr("armkin.motion.timing.speed_bounds._AT_ONCE", 37)
+    monkeypatch.setattr("armkin.motion.timing.speed_bounds._CHUNK_INTERVALS", 37)
     np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, knots.d)

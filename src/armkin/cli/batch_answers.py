@@ -22,7 +22,7 @@ from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError
 
-_AT_ONCE = 4096  # rows that become objects together: Python's take a hundred times the room of numbers
+_OBJECT_ROWS = 4096  # rows that become objects together: Python's take a hundred times the room of numbers
 
 
 class Questions(Protocol):
@@ -145,8 +145,8 @@ def answer_piece(job: Job, piece: Piece) -> Done:
 def _json_lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
     """A chunk's answers as JSON Lines."""
     lines = []
-    for start in range(0, len(chunk.values), _AT_ONCE):
-        span = slice(start, start + _AT_ONCE)
+    for start in range(0, len(chunk.values), _OBJECT_ROWS):
+        span = slice(start, start + _OBJECT_ROWS)
         part = Chunk(chunk.numbers[span], chunk.values[span])
         for number, answer in zip(part.numbers, questions.objects(part), strict=True):
             bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.board.sim.sim_board import SimBoard
 
-_CATCH_UP = 0.02  # time [s] that a board in the clock's time makes up for at once, so that its queue is not dry
+_CATCH_UP_TIME = 0.02  # time [s] that a board in the clock's time makes up for at once, so that its queue is not dry
 
 
 class SimPort:
@@ -63,7 +63,7 @@ class Paced:
         end = self.port.now() + timeout
         while True:
             clock = time.monotonic()
-            self._due = min(self._due + clock - self._clock, self.port.now() + _CATCH_UP)
+            self._due = min(self._due + clock - self._clock, self.port.now() + _CATCH_UP_TIME)
             self._clock = clock
             received = self.port.read(max(self._due - self.port.now(), 0.0))
             if received or self.port.now() >= end:

@@ -38,7 +38,7 @@ _MIN_GRID_POINTS = 1000  # points, at least, of a route's grid
 _SAMPLE_STEP = 1.0  # distance [mm], at most, between the first samples
 _SAMPLES = (200, 20_000)  # samples of a route, at least and at most
 _MANY_RESTS = 8  # rests from which on what lies between them is planned together, so many samples at once
-_AT_ONCE = 8192  # samples between rests that are planned at once
+_CHUNK_SAMPLES = 8192  # samples between rests that are planned at once
 _MAX_DISTANCE = 2.0  # distance [mm], at most, between the samples of a path that has more
 
 
@@ -201,7 +201,7 @@ def _group_rests(edges: list[float], s: Array) -> list[list[float]]:
     """Places of rest, from one to the next; where there are many, some together: between them all is independent."""
     if len(edges) <= _MANY_RESTS:
         return [list(pair) for pair in pairwise(edges)]
-    first = np.flatnonzero(np.diff(np.searchsorted(s, edges[:-1]) // _AT_ONCE, prepend=-1)).tolist()
+    first = np.flatnonzero(np.diff(np.searchsorted(s, edges[:-1]) // _CHUNK_SAMPLES, prepend=-1)).tolist()
     return [edges[a : b + 1] for a, b in pairwise([*first, len(edges) - 1])]
 
 

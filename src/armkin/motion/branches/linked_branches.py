@@ -25,7 +25,7 @@ MIN_STEP = 1e-9  # step, as a share of the route, below which what is not linked
 END_ACCURACY = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
 _TORN_PARTS = 3  # parts of a step in which branches end: where they are more, branches end everywhere
 _PART_COUNTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
-_AT_ONCE = 1024  # samples solved at once, if the parts are no fewer
+_CHUNK_SAMPLES = 1024  # samples solved at once, if the parts are no fewer
 _MAX_SAMPLES = 50_000  # samples added at most
 _BLOCK_STEPS = 16_384  # steps looked at together
 
@@ -135,7 +135,7 @@ class _Linking:
         steps = steps[plain] if quick else steps
         if not len(steps) or self.added > _MAX_SAMPLES:
             return False
-        parts = int(np.clip(_AT_ONCE // len(steps), *_PART_COUNTS))
+        parts = int(np.clip(_CHUNK_SAMPLES // len(steps), *_PART_COUNTS))
         f = np.arange(1, parts) / parts
         lengths = (c.s[steps, None] + h[steps, None] * f).ravel()
         columns = self.samples.solve_at(lengths, examine=not quick)

@@ -13,8 +13,8 @@ from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_scan import Least, backward_step, concatenate_least, forward_step, least_of, scan
 
 TINY = 1e-300  # floor of a divisor: it keeps a quotient finite where the divisor is zero
-_AT_ONCE = 16_384  # intervals whose rows are in memory: some hundred numbers each
-_BLOCK_INTERVALS = 4096  # intervals whose rows are compared pair by pair at once
+_CHUNK_INTERVALS = 16_384  # intervals whose rows are in memory: some hundred numbers each
+_PAIRED_INTERVALS = 4096  # intervals whose rows are compared pair by pair at once
 
 Intervals = slice | Int  # of the intervals
 
@@ -128,7 +128,7 @@ class Fastest:
 
 def interval_parts(intervals: int) -> list[slice]:
     """The intervals in parts that are worked on at once: a long path in bounded memory."""
-    return [slice(k, min(k + _AT_ONCE, intervals)) for k in range(0, max(intervals, 1), _AT_ONCE)]
+    return [slice(k, min(k + _CHUNK_INTERVALS, intervals)) for k in range(0, max(intervals, 1), _CHUNK_INTERVALS)]
 
 
 def _constraint_rows(motion: Motion) -> tuple[Array, Array, Array]:
@@ -152,8 +152,8 @@ def _largest_feasible(cap: Array, slope: Array, level: Array) -> Array:
     surely = lowest < highest - 1e-9 * np.abs(highest)  # cap itself leaves room for u
     close = (~surely).nonzero()[0]
     i, j = _index_pairs(len(slope))
-    for begin in range(0, len(close), _BLOCK_INTERVALS):
-        rows = close[begin : begin + _BLOCK_INTERVALS]
+    for begin in range(0, len(close), _PAIRED_INTERVALS):
+        rows = close[begin : begin + _PAIRED_INTERVALS]
         sl, lv = slope.take(rows, axis=1), level.take(rows, axis=1)
         crossing = (lv.take(i, axis=0) + lv.take(j, axis=0)) / np.abs(sl.take(i, axis=0) - sl.take(j, axis=0))
         feasible[rows] = np.fmin(feasible[rows], np.fmin.reduce(crossing, axis=0, initial=np.inf))

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 FIT_SHARE = 0.94  # share of the tolerance from points to curve (from chords to curve: less, see `fit_points`)
 PLAN_SHARES = (0.1, 0.05, 0.02)  # shares of it from curve to motion: the first that holds for all points is taken
-_AT_ONCE = 8192  # points, about, that are fitted together
+_BLOCK_POINTS = 8192  # points, about, that are fitted together
 _FARTHEST_TURN = 5.0  # turn [rad], at most, that rotation vectors tell from less
 _NAN = float("nan")
 
@@ -77,7 +77,7 @@ class Polyline:
         ends = np.concatenate([[0], back, [len(passed) - 1]])
         turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
         made: list[Piece] = []
-        for part in _point_blocks(ends, 1 if turning else _AT_ONCE):
+        for part in _point_blocks(ends, 1 if turning else _BLOCK_POINTS):
             numbers, first = passed[part[0] : part[-1] + 1], int(passed[part[0]])
             values = spots.relative_values(first, int(numbers[-1])) if turning else y[first : numbers[-1] + 1]
             assert values is not None

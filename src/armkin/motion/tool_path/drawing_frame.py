@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-_IN_PLANE = 1e-6  # sine of the angle between the tool's axis and the arm's plane
+_PLANE_SINE = 1e-6  # sine of the angle between the tool's axis and the arm's plane
 
 
 def place_drawing(arm: Arm, origin: Sequence[float], *, task: str | None = None, scale: float = 1.0) -> Placing:
@@ -57,7 +57,7 @@ def _orientation_numbers(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple
 def _pitch_along(arm: Arm, task: Task, axis: Array) -> float:
     """The pitch [deg] whose tool axis points along `axis`, the same wherever the arm's plane is turned to."""
     up = arm.base[:3, 2]
-    if np.linalg.norm(np.cross(up, axis)) > _IN_PLANE:
+    if np.linalg.norm(np.cross(up, axis)) > _PLANE_SINE:
         raise UsageError(
             f"task {task.name} holds the tool in the arm's plane, which turns: on a drawing it can only point along "
             "the base's z; place it without a tilt"
@@ -71,7 +71,7 @@ def _pitch_along(arm: Arm, task: Task, axis: Array) -> float:
     bent[0, pitch] += 0.1 / (sum_[pitch] * arm.ratio[pitch])  # phi grows by 0.1
     first, second = fk(arm, q)[0, :3, 2], fk(arm, bent)[0, :3, 2]
     normal = np.cross(first, second)
-    if np.linalg.norm(normal) < 1e-6 or abs(float(normal @ axis)) > _IN_PLANE * 0.1:
+    if np.linalg.norm(normal) < 1e-6 or abs(float(normal @ axis)) > _PLANE_SINE * 0.1:
         raise UsageError(f"the tool of {arm.name} does not lie in the arm's plane: no pitch points it straight down")
     normal /= np.linalg.norm(normal)
     angle = float(np.arctan2(normal @ np.cross(first, axis), first @ axis))

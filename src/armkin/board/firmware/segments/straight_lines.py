@@ -43,10 +43,10 @@ _CRUISE_TIMES = (0.2, 0.4)  # length [s] of a cruise segment, least and greatest
 _JERK_TIME = 0.02  # length [s] of a segment in which the acceleration changes
 _SPLIT_TIME = 0.08  # length [s] of a cruise segment whose end is one of its own
 _MIN_CRUISE = (0.03, 0.0006)  # length of a cruise, as a share of a ramp or in [s], below which it belongs to the ramps
-_MAKE_UP = 0.01  # share of its way in a piece that a motor makes up for: the board takes 1.05 of its rate
+_MAKE_UP_SHARE = 0.01  # share of its way in a piece that a motor makes up for: the board takes 1.05 of its rate
 _SPARE_SHARE = 0.0005  # share of a piece's steps that is left for the next one to make up for
 _EAGER_SEGMENTS = 2000  # segments of a line that are made at once
-_AT_ONCE = 512  # bounds of segments that are held, of a longer line
+_MAX_BOUNDS = 512  # bounds of segments that are held, of a longer line
 
 
 class Pieces(IntEnum):
@@ -107,7 +107,7 @@ class LineSegments:
                 last = ending and k + 2 == len(times)
                 unheard = unheard and float(share[k + 1]) * steps < _NO_STEP
                 seconds = (b - a) * (UNHEARD_SHARE if unheard else 1.0)
-                yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP, unheard)
+                yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP_SHARE, unheard)
                 unheard = False
         if [p // STEP for p in cutter.places] != self.end.tolist():
             raise AssertionError("a line's rates do not lead to its end")
@@ -223,7 +223,7 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
     pending: list[float] = []
     begin = 0.0
     while True:
-        more = list(islice(bounds_left, _AT_ONCE))
+        more = list(islice(bounds_left, _MAX_BOUNDS))
         pending += more
         times = np.array(pending)
         if len(times) > 2:
@@ -232,7 +232,7 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
             shift = (np.rint(position) - position)[1:-1] / np.maximum(speed[1:-1], 1e-9)
             times[1:-1] += np.where((near > 4) & (speed[1:-1] > 0), shift, 0.0)
         times[0] = begin
-        if len(more) < _AT_ONCE:
+        if len(more) < _MAX_BOUNDS:
             yield times, True
             return
         yield times[:-1], False  # what the last one is moved to depends on the next

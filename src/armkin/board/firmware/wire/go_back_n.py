@@ -17,7 +17,7 @@ from armkin.board.firmware.wire.serial_line import Line
 
 _RESEND_TIMEOUT = 0.03  # time [s] without progress, beyond that of the slowest answer, until frames are sent again
 _GAP_TIME = 0.004  # time [s] after all that was sent has left and an answer had its time
-_ASK_AFTER = 0.012  # time [s] without progress before a question is to find out
+_ASK_DELAY = 0.012  # time [s] without progress before a question is to find out
 _NOISY_RESEND = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
 _UNDER_WAY = 1, 16  # frames under way, on a bad line, where what follows a lost one is for nothing, and on a good one
 _MAX_BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
@@ -99,7 +99,7 @@ class Window:
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        patience = self._line.slowest + (_GAP_TIME if self._line.damaged else _ASK_AFTER)
+        patience = self._line.slowest + (_GAP_TIME if self._line.damaged else _ASK_DELAY)
         return bool(self._sent) and self._line.port.now() - self._line.clear > patience
 
     def _room(self, size: int, first: int) -> int:
