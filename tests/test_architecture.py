@@ -10,9 +10,7 @@ from pathlib import Path
 
 import pytest
 
-import armkin
-
-SOURCE = Path(__file__).parents[1] / "src"
+from source_trees import MODULES, SOURCE, nodes_of, syntax_tree, tree_nodes
 
 # Room -> the rooms it may import, besides itself. A room is a folder of `armkin`, or a file beside them.
 # The order is the way of the data: a room imports what stands above it.
@@ -95,22 +93,6 @@ MAY_IMPORT: dict[str, str] = {
 }
 TOP = {"cli", "__init__", "__main__"}  # may import every room, and no room imports them
 
-MODULES = {
-    ".".join(path.relative_to(SOURCE).with_suffix("").parts).removesuffix(".__init__"): path
-    for path in sorted(SOURCE.rglob("*.py"))
-}
-
-
-@cache
-def _syntax_tree(path: Path) -> ast.Module:
-    return ast.parse(path.read_text())
-
-
-@cache
-def _tree_nodes(path: Path) -> list[ast.AST]:
-    """All nodes of a file's syntax tree."""
-    return list(ast.walk(_syntax_tree(path)))
-
 
 def _room_of(module: str) -> str:
     """The room of ``armkin.inverse.closed.elbow`` is ``inverse/closed``."""
@@ -127,7 +109,7 @@ def _imports_of(module: str) -> list[str]:
 
 
 def _imported_modules(module: str) -> Iterator[str]:
-    for node in _tree_nodes(MODULES[module]):
+    for node in tree_nodes(MODULES[module]):
         if isinstance(node, ast.Import):
             yield from (name.name for name in node.names if name.name in MODULES and name.name != "armkin")
         elif isinstance(node, ast.ImportFrom) and node.module in MODULES:
@@ -150,9 +132,8 @@ def test_below_the_model_nothing_reads_the_robot_file() -> None:
     printing = {"cli", "export"}
     readers = {
         module
-        for module, path in MODULES.items()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.Attribute) and node.attr == "file" and ast.unparse(node.value).endswith("arm")
+        for module, node in nodes_of(ast.Attribute)
+        if node.attr == "file" and ast.unparse(node.value).endswith("arm")
     }
     assert not {module for module in readers if _room_of(module) not in printing}
 
@@ -194,117 +175,6 @@ def _find_circle(graph: Mapping[str, Sequence[str]]) -> str | None:
     return next((found for node in graph if (found := visit(node, ()))), None)
 
 
-WRITTEN_BY_HAND = {".py", ".c", ".h", ".ino", ".js", ".css", ".html"}
-
-
-def test_files_have_at_most_400_lines() -> None:
-    """Of the package and the firmware, in whatever language; what others wrote, and tests, are not counted."""
-    root = SOURCE.parent
-    files = [path for folder in ("src", "firmware") for path in sorted((root / folder).rglob("*"))]
-    counted = [
-        path
-        for path in files
-        if path.suffix in WRITTEN_BY_HAND and not {"vendor", "test"} & set(path.relative_to(root).parts)
-    ]
-    assert {".py", ".c", ".h", ".js"} <= {path.suffix for path in counted}
-    long = {path.relative_to(root).as_posix() for path in counted if len(path.read_text("utf-8").splitlines()) > 400}
-    assert not long
-
-
-def test_classes_have_at_most_250_lines() -> None:
-    long = {
-        node.name
-        for path in MODULES.values()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.ClassDef) and (node.end_lineno or 0) - node.lineno >= 250
-    }
-    assert not long
-
-
-def test_functions_have_at_most_60_lines() -> None:
-    """Outside `cli`, where a command's options are its function's parameters.
-
-    A public name's docstring, which has a line for every parameter (`test_docstrings`), is not counted.
-    """
-    long = {
-        f"{module}.{node.name}"
-        for module, path in MODULES.items()
-        if not module.startswith("armkin.cli.")
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef) and _line_count(module, node) > 60
-    }
-    assert not long
-
-
-def test_functions_have_at_most_15_branches() -> None:
-    """Counted in full: an `and`, an `or`, a conditional expression and every `for` and `if` of a comprehension are one.
-
-    More need a reason at the function's first line, as ruff's eight ways do.
-    """
-    branched = {
-        f"{module}.{node.name}"
-        for module, path in MODULES.items()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.FunctionDef) and _branch_count(node) > 15
-        if "noqa: C901" not in path.read_text("utf-8").splitlines()[node.lineno - 1]
-    }
-    assert not branched
-
-
-BRANCHES = {ast.If, ast.IfExp, ast.For, ast.While, ast.ExceptHandler, ast.comprehension, ast.match_case}
-
-
-def test_no_conditional_expression_stands_in_another() -> None:
-    """A reader holds one condition at a time: the inner choice gets a name, or an `if`."""
-    nested = {
-        f"{module}:{node.lineno}"
-        for module, path in MODULES.items()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.IfExp) and sum(isinstance(inner, ast.IfExp) for inner in ast.walk(node)) > 1
-    }
-    assert not nested
-
-
-def test_at_most_three_values_are_assigned_at_once() -> None:
-    """One by one by a tuple on the right: what belongs together stands on one line."""
-    crowded = {
-        f"{module}:{node.lineno}"
-        for module, path in MODULES.items()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple)
-        if isinstance(node.value, ast.Tuple) and len(node.value.elts) > 3
-    }
-    assert not crowded
-
-
-def _branch_count(function: ast.FunctionDef) -> int:
-    """Ways through a function, one more than its decisions; functions in it are counted by themselves."""
-    left: list[ast.AST] = [*function.body]
-    count = 1
-    while left:
-        node = left.pop()
-        count += type(node) in BRANCHES
-        if isinstance(node, ast.BoolOp):
-            count += len(node.values) - 1
-        elif isinstance(node, ast.comprehension):
-            count += len(node.ifs)
-        if not isinstance(node, ast.FunctionDef | ast.ClassDef):
-            left += ast.iter_child_nodes(node)
-    return count
-
-
-def test_branches_are_counted_in_full() -> None:
-    [node] = ast.parse("def f(x):\n    return [y for y in x if y and (y > 1 or y < 0)] if x else 0").body
-    assert isinstance(node, ast.FunctionDef)
-    assert _branch_count(node) == 6
-
-
-def _line_count(module: str, node: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
-    public = module == f"armkin.{armkin._HOME.get(node.name)}"
-    docstring = (node.body[0].end_lineno or 0) - node.body[0].lineno + 1 if public else 0
-    return (node.end_lineno or 0) - node.lineno + 1 - docstring
-
-
 NAMES_ARE_GIVEN = {"cli/commands", "board/kinds"}  # by the command line and by robot files: CONTRIBUTING.md
 
 
@@ -324,38 +194,6 @@ def test_no_file_has_the_name_of_a_folder() -> None:
     folders = {name for file in files for name in file.parent.parts}
     given = {file for file in files if file.parent.as_posix() in NAMES_ARE_GIVEN}
     assert not [file for file in files if file.stem in folders - set(file.parent.parts) and file not in given]
-
-
-def test_every_class_and_public_function_has_a_docstring() -> None:
-    """Methods, too, those of private classes included; a setter's is its property's."""
-    silent = {
-        f"{module}.{node.name}"
-        for module, path in MODULES.items()
-        for owner in _tree_nodes(path)
-        if isinstance(owner, ast.Module | ast.ClassDef)
-        for node in owner.body
-        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
-        if ast.get_docstring(node, clean=False) is None
-    }
-    assert not silent
-
-
-def test_every_function_of_more_than_25_lines_has_a_docstring() -> None:
-    """Private ones, too: nobody reads so many lines to learn what they are for."""
-    silent = {
-        f"{module}.{node.name}"
-        for module, path in MODULES.items()
-        for node in _tree_nodes(path)
-        if isinstance(node, ast.FunctionDef) and node.name != "__init__" and ast.get_docstring(node) is None
-        if (node.end_lineno or 0) - node.lineno >= 25
-    }
-    assert not silent
-
-
-def _is_public(node: ast.FunctionDef) -> bool:
-    return not node.name.startswith("_") and not any(
-        ast.unparse(one).endswith(".setter") for one in node.decorator_list
-    )
 
 
 def test_nothing_imports_from_a_test() -> None:
@@ -378,7 +216,7 @@ LISTED_ELSEWHERE = {  # the table of commands in docs/architecture.md; a kind is
 @pytest.mark.parametrize("package", [path for path in PACKAGES if path not in LISTED_ELSEWHERE], ids=lambda p: p.name)
 def test_a_package_lists_its_files(package: Path) -> None:
     """And no other files: every word that ends in .py is one of its own, or has a path before it."""
-    text = ast.get_docstring(_syntax_tree(package / "__init__.py")) or ""
+    text = ast.get_docstring(syntax_tree(package / "__init__.py")) or ""
     files = {
         f"{path.name}{'/' * path.is_dir()}" for path in package.iterdir() if path.suffix == ".py" or _is_room(path)
     }
@@ -398,7 +236,7 @@ def test_outside_board_nobody_knows_a_kind() -> None:
     }
     found = []
     for module in (name for name in MODULES if not name.startswith("armkin.board.")):
-        for node in _tree_nodes(MODULES[module]):
+        for node in tree_nodes(MODULES[module]):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "isinstance":
                 asked = ast.unparse(node.args[1])
                 if any(word in asked for word in ("Machine", "Foreign", "Configuration", "Backend", "FirmwareBoard")):

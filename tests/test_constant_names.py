@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import ast
-from pathlib import Path
 
-import armkin
+from source_trees import MODULES, syntax_tree
 
-SOURCE = Path(armkin.__file__).parent
 NO_QUANTITY = (
     "AGAIN AHEAD ALIKE APART AROUND ASIDE ASKING AWAY BEGINNING BEGINS BESIDE BETWEEN BIG BOOT BUSY CAN CLOSE CLOSER "
     "COARSE COARSER COARSEST CREEP DEBOUNCE DEEPEST DENSE EACH EAGER ENDLESS EVEN EVERY FAR FARTHEST FAST FASTEST FEW "
@@ -20,14 +18,14 @@ NO_QUANTITY = (
 )
 
 
-def constants_of(file: Path) -> set[str]:
+def constants_of(module: str) -> set[str]:
     """The names that a module assigns to, without their underscore."""
-    statements = [node for node in ast.parse(file.read_text()).body if isinstance(node, ast.Assign | ast.AnnAssign)]
+    statements = [node for node in syntax_tree(MODULES[module]).body if isinstance(node, ast.Assign | ast.AnnAssign)]
     names = (name.id for node in statements for name in ast.walk(node) if isinstance(name, ast.Name))
     return {name.lstrip("_") for name in names}
 
 
 def test_a_constant_is_no_bare_verb_adjective_or_numeral() -> None:
     bare_words = set(NO_QUANTITY.split())
-    bare = {str(file.relative_to(SOURCE)): constants_of(file) & bare_words for file in SOURCE.rglob("*.py")}
-    assert {file: names for file, names in bare.items() if names} == {}
+    bare = {module: constants_of(module) & bare_words for module in MODULES}
+    assert {module: names for module, names in bare.items() if names} == {}

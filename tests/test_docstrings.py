@@ -1,4 +1,4 @@
-"""The docstrings of the public names say what goes in, what comes out and what is raised, in one format."""
+"""What needs a docstring has one; those of the public names say what goes in and out and is raised, in one format."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import pytest
 import armkin
 from armkin import errors
 from command_line import ROOT
+from source_trees import FUNCTION, nodes_of
 
 SECTION = re.compile(r"^(Args|Attributes|Returns|Raises):\n((?:(?:    .*)?\n?)*)", re.M)
 ENTRY = re.compile(r"^    \*{0,2}(\w+): *(\S.*(?:\n {6,}.*)*)", re.M)  # a name, what it is, and lines indented more
@@ -84,13 +85,39 @@ def test_there_is_something_to_read() -> None:
     assert len(CLASSES) > 12
 
 
+def test_every_class_and_public_function_has_a_docstring() -> None:
+    """Methods, too, those of private classes included; a setter's is its property's."""
+    silent = {
+        f"{module}.{node.name}"
+        for module, owner in nodes_of(ast.Module | ast.ClassDef)
+        for node in owner.body
+        if isinstance(node, ast.ClassDef) or (isinstance(node, ast.FunctionDef) and _is_public(node))
+        if ast.get_docstring(node, clean=False) is None
+    }
+    assert not silent
+
+
+def test_every_function_of_more_than_25_lines_has_a_docstring() -> None:
+    """Private ones, too: nobody reads so many lines to learn what they are for."""
+    silent = {
+        f"{module}.{node.name}"
+        for module, node in nodes_of(ast.FunctionDef)
+        if node.name != "__init__" and ast.get_docstring(node) is None and node.end_lineno - node.lineno >= 25
+    }
+    assert not silent
+
+
+def _is_public(node: ast.FunctionDef) -> bool:
+    return not node.name.startswith("_") and not any(
+        ast.unparse(one).endswith(".setter") for one in node.decorator_list
+    )
+
+
 def test_every_docstring_names_what_it_is_about() -> None:
     leaning = [
-        f"{path.relative_to(ROOT)}:{node.lineno} {text}"
-        for path in (ROOT / "src").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
-        and WITHOUT_NOUN.match(text := ast.get_docstring(node) or "")
+        f"{module}:{node.lineno} {text}"
+        for module, node in nodes_of(FUNCTION | ast.ClassDef)
+        if WITHOUT_NOUN.match(text := ast.get_docstring(node) or "")
     ]
     assert not leaning
 

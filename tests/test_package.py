@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from source_trees import MODULES, syntax_tree
+
 ROOT = Path(__file__).parents[1]
 SOURCE = ROOT / "src" / "armkin"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
@@ -119,8 +121,8 @@ def test_the_package_is_imported_from_where_it_was_installed(programs: Path, tmp
 
 def test_nothing_that_windows_lacks_is_imported_at_module_level() -> None:
     found = []
-    for path in SOURCE.rglob("*.py"):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+    for path in MODULES.values():
+        for node in syntax_tree(path).body:
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             names += [str(node.module)] if isinstance(node, ast.ImportFrom) else []
             found += [f"{path.name}: {name}" for name in names if name.split(".")[0] in POSIX_ONLY]

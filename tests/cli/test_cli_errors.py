@@ -16,6 +16,7 @@ from armkin.cli import advice
 from armkin.cli.app import load_command
 from armkin.cli.commands import COMMANDS
 from command_line import run
+from source_trees import nodes_of
 
 SOURCE = Path(__file__).parents[2] / "src" / "armkin"
 DOF = "robots/three_dof.yaml"
@@ -106,11 +107,9 @@ def test_every_kind_that_has_advice_is_raised_somewhere() -> None:
 def test_no_text_of_the_core_names_an_option() -> None:
     options = {word for name in COMMANDS for p in load_command(name).params for word in p.opts if word.startswith("--")}
     naming = [
-        f"{path.relative_to(SOURCE)}:{node.lineno}: {word}"
-        for path in sorted(SOURCE.rglob("*.py"))
-        if path.relative_to(SOURCE).parts[0] != "cli"
-        for node in ast.walk(ast.parse(path.read_text()))
-        if isinstance(node, ast.Constant) and isinstance(node.value, str)
+        f"{module}:{node.lineno}: {word}"
+        for module, node in nodes_of(ast.Constant)
+        if isinstance(node.value, str) and not f"{module}.".startswith("armkin.cli.")
         for word in re.findall(r"(?<![\w-])--[a-z][a-z-]*", node.value)
         if word in options
     ]
