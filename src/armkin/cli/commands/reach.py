@@ -44,10 +44,8 @@ def reach(
 
     arm = arguments.load_arm(robot, scene)
     step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MAX_CELLS)
-    direction_count, turns = (
-        whole_number(directions, "--directions", 1, MAX_CELLS),
-        whole_number(rolls, "--rolls", 1, MAX_CELLS),
-    )
+    direction_count = whole_number(directions, "--directions", 1, MAX_CELLS)
+    turns = whole_number(rolls, "--rolls", 1, MAX_CELLS)
     cells = len(Grid(arm, step, ring, direction_count, turns, tool_down).rings) * ring
     with output.progress("cells", cells) as tick:
         reach_map = armkin.reach(

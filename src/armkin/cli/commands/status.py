@@ -44,10 +44,7 @@ def status(
             return {**head, **where_arm_stands(machine), **machine.report()}
 
         def text(status: dict[str, Any]) -> str:
-            report_text = _grbl_text if "settings" in status else _text
-            if "servos" in status:
-                report_text = _servos_text
-            return render.to_json(status) + "\n" if json else board_link.where_text(arm, status) + report_text(status)
+            return render.to_json(status) + "\n" if json else board_link.where_text(arm, status) + _report_text(status)
 
         if watch:
             _print_changes(text(status_json()) for _ in _until_signal(machine.refresh, board.stop))
@@ -87,6 +84,13 @@ def _print_changes(texts: Iterator[str]) -> None:
             before = text
 
 
+def _report_text(answer: dict[str, Any]) -> str:
+    """What the kind of board says of itself, as a table."""
+    if "servos" in answer:
+        return _servos_text(answer)
+    return _grbl_text(answer) if "settings" in answer else _firmware_text(answer)
+
+
 def _servos_text(answer: dict[str, Any]) -> str:
     rows = [["servo", "id", "torque", "load", "voltage", "temperature", "errors"]]
     for servo in answer["servos"]:
@@ -114,7 +118,7 @@ _POWER = {
 }
 
 
-def _text(answer: dict[str, Any]) -> str:
+def _firmware_text(answer: dict[str, Any]) -> str:
     high = [name for name, level in answer["switches"].items() if level]
     low = [name for name, level in answer["switches"].items() if not level]
     switch_word = {True: "on", False: "off"}

@@ -1,6 +1,6 @@
-/* Targets on an edge whose branches stand alone, meet in pairs, or lie on self-motions with two ends close by:
-   armkin.inverse.singular.local_structure, for one target, where one direction is lost and no joint is free. All others
-   are left to Python. */
+/* Targets on an edge whose branches stand alone, meet in pairs, or lie on self-motions whose ends are found:
+   armkin.inverse.singular.local_structure and chains, for one target, where one direction is lost and no joint is free. All
+   others are left to Python. */
 enum { ARM_NODES = @nodes_count@ };
 
 /* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. longer: times as long a span is likely to
