@@ -23,7 +23,7 @@ from armkin.formula import arrays, pose
 from armkin.formula.array_shapes import Figures, Frames, Jacobians, Joints, Points, Poses
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
-from armkin.formula.trace import SMALL_BATCH, LazyCode
+from armkin.formula.trace import SMALL_BATCH, LazyCode, StraightLineCode
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -171,6 +171,7 @@ def condition(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> 
 
 
 def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, scale: float = 1.0) -> Array:
+    """Singular values (..., k) of the Jacobian's rows, largest first, its linear rows divided by `scale` [mm]."""
     if rows is None:
         rows = slice(0, 3) if arm.n <= 3 else slice(0, 6)
     J = jacobian(arm, q)
@@ -337,31 +338,41 @@ def _joint_motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
 
 
 def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
-    """Run a formula over the batch axes of q, of small batches with all cosines and sines taken at once.
-
-    Large ones in chunks that stay in the cache.
-    """
+    """A formula's entries for every pose: values (..., n) -> (..., *shape)."""
     results = np.empty(values.shape[:-1] + shape)
-    flat_q, flat_out = values.reshape(-1, arm.n), results.reshape(-1, math.prod(shape))
-    if len(flat_q) > SMALL_BATCH:
-        large = _recorded_code(arm, formula).record_now()
-        workspace = large.workspace(min(len(flat_q), arrays.CHUNK))
-        for start in range(0, len(flat_q), arrays.CHUNK):
-            columns = np.ascontiguousarray(flat_q[start : start + arrays.CHUNK].T)
-            if columns.shape[1] < arrays.CHUNK <= len(flat_q):
-                workspace = large.workspace(columns.shape[1])
-            for k, entry in enumerate(large.run(list(columns), workspace)):
-                flat_out[start : start + arrays.CHUNK, k] = entry
-        return results
-    turns, code = _slides_and_turns(arm, flat_q), _recorded_of_turns(arm, formula).get(len(flat_q))
-    if code is not None and len(flat_q) <= FEW_POSES:
-        numbers = code.single_pose_function()
-        for k, inputs in enumerate(turns.T.tolist()):
-            flat_out[k] = numbers(*inputs)
-        return results
-    entries: Any = (
-        formula(arm, _joint_motions(arm, turns)) if code is None else code.run(list(turns), code.workspace(len(flat_q)))
-    )
-    for k, entry in enumerate(entries):
-        flat_out[:, k] = entry
+    q, rows = values.reshape(-1, arm.n), results.reshape(-1, math.prod(shape))
+    if len(q) > SMALL_BATCH:
+        _fill_by_chunks(rows, q, _recorded_code(arm, formula).record_now())
+    else:
+        _fill_small_batch(rows, arm, q, formula)
     return results
+
+
+def _fill_by_chunks(rows: Array, q: Array, code: StraightLineCode) -> None:
+    """Write the entries of many poses q (N, n) into rows (N, entries), in chunks that stay in the cache."""
+    workspace = code.workspace(min(len(q), arrays.CHUNK))
+    for start in range(0, len(q), arrays.CHUNK):
+        chunk = slice(start, start + arrays.CHUNK)
+        columns = np.ascontiguousarray(q[chunk].T)
+        if columns.shape[1] < arrays.CHUNK <= len(q):  # the last chunk is shorter
+            workspace = code.workspace(columns.shape[1])
+        for k, entry in enumerate(code.run(list(columns), workspace)):
+            rows[chunk, k] = entry
+
+
+def _fill_small_batch(rows: Array, arm: Arm, q: Array, formula: Formula) -> None:
+    """Write the entries of a few poses q (N, n) into rows (N, entries), all cosines and sines taken at once."""
+    turns = _slides_and_turns(arm, q)
+    code = _recorded_of_turns(arm, formula).get(len(q))
+    if code is not None and len(q) <= FEW_POSES:
+        entries_of_pose = code.single_pose_function()
+        for k, inputs in enumerate(turns.T.tolist()):
+            rows[k] = entries_of_pose(*inputs)
+        return
+    entries: Any
+    if code is None:  # the formula is not recorded yet
+        entries = formula(arm, _joint_motions(arm, turns))
+    else:
+        entries = code.run(list(turns), code.workspace(len(q)))
+    for k, entry in enumerate(entries):
+        rows[:, k] = entry

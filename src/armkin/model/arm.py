@@ -176,13 +176,13 @@ def from_links(
     """
     n = len(prismatic)
     links = freeze(link)
+    slides = freeze(prismatic, bool)
     span = np.broadcast_to([-math.inf, math.inf], (n, 2)) if limits is None else np.asarray(limits, dtype=float)
     gain = _as_array(motor_gain, np.zeros((0, n)))
-    sliding = np.abs(np.where(np.isfinite(span), span, 0.0)).max(axis=1)[np.asarray(prismatic, dtype=bool)]
     return Arm(
         name=name,
         joint_names=tuple(f"q{i + 1}" for i in range(n)),
-        prismatic=freeze(prismatic, bool),
+        prismatic=slides,
         link=links,
         frame=freeze(np.broadcast_to(np.eye(4), (n, 4, 4))),
         base=freeze(np.eye(4)),
@@ -199,12 +199,22 @@ def from_links(
         task=task,
         motor_gain=gain,
         motor_bias=freeze(np.zeros(len(gain))),
-        reach=float(np.linalg.norm(links[1:, :3, 3], axis=1).sum() + sliding.sum()) or 1.0,
+        reach=_reach(links, span[slides]) or 1.0,
         pose_names=(),
         pose_joints=freeze(np.zeros((0, n))),
         homing=(None,) * n,
         hard_limits=(False,) * n,
     )
+
+
+def _reach(link: Array, travel: Array) -> float:
+    """Sum [mm] of the lengths of the links (n + 1, 4, 4) after the first joint and of the slides' travel (k, 2).
+
+    A limit that is infinite adds nothing.
+    """
+    link_lengths = np.linalg.norm(link[1:, :3, 3], axis=1)
+    slide_lengths = np.abs(np.where(np.isfinite(travel), travel, 0.0)).max(axis=1)
+    return float(link_lengths.sum() + slide_lengths.sum())
 
 
 def _as_array(values: ArrayLike | None, default: Array) -> Array:

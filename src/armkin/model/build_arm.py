@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from os import PathLike
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from armkin.model.rotation import FLIP, cos_sin_deg, inverse, transform
 
 if TYPE_CHECKING:
     from armkin.robot_file import Joint, RobotFile
+    from armkin.robot_file.robot_keys import Motor
     from armkin.robot_file.scene_file import Scene
 
 
@@ -93,18 +95,26 @@ def _chain(file: RobotFile, base: Array) -> tuple[list[Array], list[Array]]:
     end = transform(file.tool.xyz, file.tool.rpy)
     if file.zero_pose is not None:
         end = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ end
-    before, after, frame = [], [], []
-    for joint in file.joints:
-        if file.convention == "screws":
-            pre, post, frame_after = _screw_factors(joint)
-        else:
-            pre, post, frame_after = _dh_factors(joint, modified=file.convention == "modified")
-        flip = FLIP if joint.sign < 0 else np.eye(4)
-        before.append(pre @ flip)
-        after.append(flip @ post)
-        frame.append(flip @ frame_after)
-    between = [post @ pre for post, pre in zip(after[:-1], before[1:], strict=True)]
-    return [base @ before[0], *between, after[-1] @ end], frame
+    joints = [_joint_factors(joint, file.convention) for joint in file.joints]
+    between = [joint.after @ following.before for joint, following in pairwise(joints)]
+    links = [base @ joints[0].before, *between, joints[-1].after @ end]
+    return links, [joint.frame for joint in joints]
+
+
+class _JointFactors(NamedTuple):
+    """Constant transforms (4, 4) [mm] of one joint, whose own transform is ``before Z(q) after``."""
+
+    before: Array
+    after: Array
+    frame: Array  # from the joint's motion to the frame that its convention gives it
+
+
+def _joint_factors(joint: Joint, convention: str) -> _JointFactors:
+    """A joint's factors by its screw or its row of the table; sign -1 turns its axis round."""
+    modified = convention == "modified"
+    factors = _screw_factors(joint) if convention == "screws" else _dh_factors(joint, modified=modified)
+    flip = FLIP if joint.sign < 0 else np.eye(4)
+    return _JointFactors(factors.before @ flip, flip @ factors.after, flip @ factors.frame)
 
 
 def _numbers_or_nan(values: Iterable[float | None]) -> Array:
@@ -125,8 +135,8 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
     return fields
 
 
-def _dh_factors(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
-    """Constant factors before and after a joint's motion, and its frame after the motion.
+def _dh_factors(joint: Joint, *, modified: bool) -> _JointFactors:
+    """The factors of a row of a Denavit-Hartenberg table.
 
     Standard: A = Rz(theta + q) Tz(d) Tx(a) Rx(alpha). Modified (Craig): the row's a and
     alpha stand before the joint: A = Rx(alpha) Tx(a) Rz(theta + q) Tz(d).
@@ -138,12 +148,13 @@ def _dh_factors(joint: Joint, *, modified: bool) -> tuple[Array, Array, Array]:
     z_part = np.array([[ct, -st, 0, 0], [st, ct, 0, 0], [0, 0, 1, dh.d], [0, 0, 0, 1.0]])
     x_part = np.array([[1, 0, 0, dh.a], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1.0]])
     if modified:
-        return x_part, z_part, z_part
-    return np.eye(4), z_part @ x_part, z_part @ x_part
+        return _JointFactors(before=x_part, after=z_part, frame=z_part)
+    A = z_part @ x_part
+    return _JointFactors(before=np.eye(4), after=A, frame=A)
 
 
-def _screw_factors(joint: Joint) -> tuple[Array, Array, Array]:
-    """exp([S] q) = B Z(q) B^-1 with B's z axis on the screw's axis (Lynch & Park, Modern Robotics, 3.3.2)."""
+def _screw_factors(joint: Joint) -> _JointFactors:
+    """The factors of exp([S] q) = B Z(q) B^-1, B's z axis on the screw's (Lynch & Park, Modern Robotics, 3.3.2)."""
     assert joint.screw is not None
     w, v = (np.array(part, dtype=float) for part in joint.twist())
     if joint.type == "prismatic":
@@ -158,7 +169,7 @@ def _screw_factors(joint: Joint) -> tuple[Array, Array, Array]:
     frame_after = np.eye(4)
     frame_after[:3, 3] = point
     back = inverse(B)
-    return B, back, back @ frame_after
+    return _JointFactors(before=B, after=back, frame=back @ frame_after)
 
 
 def _perpendicular(z: Array) -> Array:
@@ -183,12 +194,18 @@ def _motor_gain_and_bias(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     gain = np.zeros((len(motors), len(file.joints)))
     bias = np.zeros(len(motors))
     for k, motor in enumerate(motors):
-        servo = motor.travel if motor.kind == "servo" and motor.pulse_us is not None else None
         turn = -1.0 if motor.kind != "stepper" and motor.invert else 1.0
         for name, weight in motor.joints.items():
             gain[k, index[name]] = turn * weight * motor.pulses_per_unit()
-        if servo is not None and motor.pulse_us is not None:
-            bias[k] = motor.pulse_us[0] + (motor.zero - servo[0]) * motor.pulses_per_unit() + gain[k] @ home
-        elif motor.kind == "bus":
-            bias[k] = motor.zero + gain[k] @ home
+        if (pulses_at_zero := _pulses_at_zero(motor)) is not None:
+            bias[k] = pulses_at_zero + gain[k] @ home
     return gain / unit, bias
+
+
+def _pulses_at_zero(motor: Motor) -> float | None:
+    """Pulse width [us] or count of a servo whose joint is at 0; None where pulses count from home."""
+    if motor.kind == "bus":
+        return motor.zero
+    if motor.kind == "servo" and motor.pulse_us is not None and motor.travel is not None:
+        return motor.pulse_us[0] + (motor.zero - motor.travel[0]) * motor.pulses_per_unit()
+    return None

@@ -18,6 +18,11 @@ from armkin.model.rotation import joint_motion
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
+# Arrays of `Arm` with a number for each joint.
+_JOINT_ARRAYS = (
+    "prismatic", "lower", "upper", "home", "max_speed", "max_accel", "max_jerk", "dh_sign", "dh_theta", "ratio",
+)  # fmt: skip
+
 
 def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     """The arm with some joints held: fewer joints, the held motions folded into its links.
@@ -38,6 +43,25 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     >>> lock(armkin.load("robots/panda.yaml"), {"J3": 0.35}).joint_names
     ('J1', 'J2', 'J4', 'J5', 'J6', 'J7')
     """
+    _check_held(arm, held)
+    free = [i for i, name in enumerate(arm.joint_names) if name not in held]
+    return replace(
+        arm,
+        joint_names=tuple(arm.joint_names[i] for i in free),
+        link=_links_with_held_motions(arm, held),
+        frame=arm.frame[free],
+        motor_gain=arm.motor_gain[:, free],
+        pose_joints=arm.pose_joints[:, free],
+        homing=tuple(arm.homing[i] for i in free),
+        hard_limits=tuple(arm.hard_limits[i] for i in free),
+        held=(*arm.held, *held),
+        whole=(arm, dict(held)) if arm.keep_out else None,
+        **{field: getattr(arm, field)[free] for field in _JOINT_ARRAYS},
+    )
+
+
+def _check_held(arm: Arm, held: Mapping[str, float]) -> None:
+    """Raise UsageError unless the joints exist, their values are finite and one joint at least stays free."""
     for name, value in held.items():
         joint_index(arm, name)
         number = arrays.real_array(value, name)
@@ -45,42 +69,18 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
             raise UsageError(f"{name} cannot be held at {value}: give one finite number")
     if len(held) >= arm.n:
         raise UsageError(f"{arm.name}: with {', '.join(held)} held no joint is left to solve for")
-    links, frame, free = [arm.link[0]], [], []
+
+
+def _links_with_held_motions(arm: Arm, held: Mapping[str, float]) -> Array:
+    """The chain's constant links (free joints + 1, 4, 4) [mm]: each held joint's motion is part of the link before."""
+    links = [arm.link[0]]
     for i, name in enumerate(arm.joint_names):
         if name in held:
-            links[-1] = links[-1] @ joint_motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i]) @ arm.link[i + 1]
+            motion = joint_motion(bool(arm.prismatic[i]), held[name] * arm.ratio[i])
+            links[-1] = links[-1] @ motion @ arm.link[i + 1]
         else:
-            free.append(i)
-            frame.append(arm.frame[i])
             links.append(arm.link[i + 1])
-    per_joint = {
-        field: getattr(arm, field)[free]
-        for field in (
-            "prismatic",
-            "lower",
-            "upper",
-            "home",
-            "max_speed",
-            "max_accel",
-            "max_jerk",
-            "dh_sign",
-            "dh_theta",
-            "ratio",
-        )
-    }
-    return replace(
-        arm,
-        joint_names=tuple(arm.joint_names[i] for i in free),
-        link=np.array(links),
-        frame=np.array(frame),
-        motor_gain=arm.motor_gain[:, free],
-        pose_joints=arm.pose_joints[:, free],
-        homing=tuple(arm.homing[i] for i in free),
-        hard_limits=tuple(arm.hard_limits[i] for i in free),
-        held=(*arm.held, *held),
-        whole=(arm, dict(held)) if arm.keep_out else None,
-        **per_joint,
-    )
+    return np.array(links)
 
 
 def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
