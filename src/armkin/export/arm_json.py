@@ -22,27 +22,10 @@ def arm_numbers(arm: Arm) -> dict[str, Any]:
     `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
     """
     screws = conventions.screws(arm)
-    limits, home, unit = units.limits_out(arm), units.home_out(arm), units.unit_names(arm)
-    speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
-    joints = [
-        {
-            "name": name,
-            "type": "prismatic" if arm.prismatic[i] else "revolute",
-            "unit": unit[i],
-            "screw": screws["joints"][i]["screw"],
-            "sign": int(arm.dh_sign[i]),
-            "ratio": float(arm.ratio[i]),
-            "limits": list(limits[i]) if np.isfinite(limits[i]).all() else None,
-            "home": home[i],
-            "max_speed": None if np.isnan(speeds[i]) else speeds[i],
-            "max_accel": None if np.isnan(accels[i]) else accels[i],
-        }
-        for i, name in enumerate(arm.joint_names)
-    ]
     return {
         "length_unit": "mm",
         "angle_unit": "deg",
-        "joints": joints,
+        "joints": _joint_objects(arm, [joint["screw"] for joint in screws["joints"]]),
         "base": arm.base.tolist(),
         "zero_pose": screws["zero_pose"],
         "tool": screws.get("tool", _IDENTITY),
@@ -50,6 +33,28 @@ def arm_numbers(arm: Arm) -> dict[str, Any]:
         "dh_standard": _dh_table(arm, modified=False),
         "dh_modified": _dh_table(arm, modified=True),
     }
+
+
+def _joint_objects(arm: Arm, screws: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Each joint's name, screw, limits and speeds [deg | mm, per s, per s2]; None for numbers that it has not."""
+    limits, home, unit = units.limits_out(arm), units.home_out(arm), units.unit_names(arm)
+    speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
+    joints = []
+    for i, name in enumerate(arm.joint_names):
+        joint = {
+            "name": name,
+            "type": "prismatic" if arm.prismatic[i] else "revolute",
+            "unit": unit[i],
+            "screw": screws[i],
+            "sign": int(arm.dh_sign[i]),
+            "ratio": float(arm.ratio[i]),
+            "limits": list(limits[i]) if np.isfinite(limits[i]).all() else None,
+            "home": home[i],
+            "max_speed": None if np.isnan(speeds[i]) else speeds[i],
+            "max_accel": None if np.isnan(accels[i]) else accels[i],
+        }
+        joints.append(joint)
+    return joints
 
 
 def _dh_table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable
 from functools import lru_cache
 from types import CodeType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -44,41 +44,63 @@ _FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "ata
 MAX_BRACKETS = 20  # brackets within brackets, at most, that a line may have: Python's parser takes 200
 
 Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
-Step = tuple[Value, str, list[Value | str]]  # a value: the operation that it is the result of, and on what
+
+
+class Step(NamedTuple):
+    """An operation on values or constants' digits."""
+
+    output: Value
+    op: str
+    args: list[Value | str]
+
+
+class Expression(NamedTuple):
+    """Python code of a value, and how many brackets within brackets it has."""
+
+    code: str
+    depth: int = 0
 
 
 def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     """Branch axes unrolled, one line a value that is used more than once: a function of the inputs as numbers."""
     steps, outputs = _unroll(recording)
-    uses = _count_uses(steps, outputs)
-    inputs: list[Value] = [(id(node), ()) for node in recording.inputs]
-    texts: dict[Value | str, tuple[str, int]] = {x: (f"i{k}", 0) for k, x in enumerate(inputs)}
+    inputs: dict[Value, str] = {(id(node), ()): f"i{k}" for k, node in enumerate(recording.inputs)}
+    lines, expressions = _write_lines(steps, _count_uses(steps, outputs), inputs)
+    returned = []
+    for x, branches in zip(recording.outputs, outputs, strict=True):
+        joined = ", ".join(_expression(value, expressions).code for value in branches)
+        returned.append(f"({joined},)" if axes_of(x) else joined)
+    return function_of(list(inputs.values()), lines, returned, dict(_FUNCTIONS))
+
+
+def _write_lines(
+    steps: list[Step], uses: Counter[Value | str], inputs: dict[Value, str]
+) -> tuple[list[str], dict[Value, Expression]]:
+    """A line for each value that is used more than once or has too many brackets, and how every value is read."""
+    expressions = {value: Expression(name) for value, name in inputs.items()}
     lines: list[str] = []
-
-    def text(x: Value | str) -> tuple[str, int]:
-        return (x, 0) if isinstance(x, str) else texts[x]
-
     for output, op, args in steps:
         if not uses[output]:
             continue
-        shown = [text(x) for x in args]
-        line, depth = _PYTHON[op].format(*(t for t, _ in shown)), 1 + max(d for _, d in shown)
+        operands = [_expression(x, expressions) for x in args]
+        code, depth = _PYTHON[op].format(*(x.code for x in operands)), 1 + max(x.depth for x in operands)
         if uses[output] == 1 and depth < MAX_BRACKETS:
-            texts[output] = f"({line})", depth
+            expressions[output] = Expression(f"({code})", depth)
         else:
             name = f"t{len(lines)}"
-            lines.append(f"{name} = {line}")
-            texts[output] = name, 0
-    returned = []
-    for x, every in zip(recording.outputs, outputs, strict=True):
-        joined = ", ".join(text(v)[0] for v in every)
-        returned.append(f"({joined},)" if axes_of(x) else joined)
-    return function_of([texts[x][0] for x in inputs], lines, returned, dict(_FUNCTIONS))
+            lines.append(f"{name} = {code}")
+            expressions[output] = Expression(name)
+    return lines, expressions
+
+
+def _expression(x: Value | str, expressions: dict[Value, Expression]) -> Expression:
+    """How a value or a constant's digits are read."""
+    return Expression(x) if isinstance(x, str) else expressions[x]
 
 
 def _count_uses(steps: list[Step], outputs: list[list[Value | str]]) -> Counter[Value | str]:
     """How many times each value that leads to an output is read."""
-    uses: Counter[Value | str] = Counter(x for every in outputs for x in every)
+    uses: Counter[Value | str] = Counter(value for branches in outputs for value in branches)
     for output, op, args in reversed(steps):
         if uses[output]:
             uses.update(args * 2 if op == "sign" else args)
@@ -112,7 +134,7 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
                 continue
             if op == "negative":
                 minus[output] = args[0]
-            steps.append((output, op, args))
+            steps.append(Step(output, op, args))
     return steps, [[value(x, index) for index in np.ndindex(*axes_of(x))] for x in recording.outputs]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -65,19 +66,16 @@ def export(
     same arm, the same poses.
     """
     kinds: dict[str, tuple[bool, Callable[[Arm], None]]] = {
-        "--urdf": (urdf, lambda arm: _write_urdf(arm, out)),
-        "--dh": (dh, lambda arm: _write_table(arm, "standard", out)),
-        "--mdh": (mdh, lambda arm: _write_table(arm, "modified", out)),
-        "--screws": (screws, lambda arm: _write_table(arm, "screws", out)),
-        "--json": (json, lambda arm: _write_json(arm, out)),
-        "--c": (c, lambda arm: _write_c(arm, task, single, out)),
-        "--js": (js, lambda arm: _write_js(arm, task, out)),
-        "--html": (html, lambda arm: _write_html(arm, task, path, meshes, out)),
+        "--urdf": (urdf, partial(_write_urdf, out=out)),
+        "--dh": (dh, partial(_write_table, convention="standard", out=out)),
+        "--mdh": (mdh, partial(_write_table, convention="modified", out=out)),
+        "--screws": (screws, partial(_write_table, convention="screws", out=out)),
+        "--json": (json, partial(_write_json, out=out)),
+        "--c": (c, partial(_write_c, task=task, single=single, out=out)),
+        "--js": (js, partial(_write_js, task=task, out=out)),
+        "--html": (html, partial(_write_html, task=task, path=path, meshes=meshes, out=out)),
     }
-    chosen = [name for name, (is_chosen, _) in kinds.items() if is_chosen]
-    if len(chosen) != 1:
-        listed = ", ".join(kinds)
-        raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(chosen)}" if chosen else ""))
+    chosen = _one_chosen({name: is_chosen for name, (is_chosen, _) in kinds.items()})
     if single and not c:
         raise UsageError("--float goes with --c alone")
     if path is not None and not html:
@@ -85,8 +83,18 @@ def export(
     if meshes is not None and not html:
         raise UsageError("--meshes goes with --html alone")
     if not c:
-        output.check_destination(out, f"export {chosen[0]} is", *_ENDINGS[chosen[0]])
-    kinds[chosen[0]][1](arguments.load_arm(robot, scene))
+        output.check_destination(out, f"export {chosen} is", *_ENDINGS[chosen])
+    _, write_file = kinds[chosen]
+    write_file(arguments.load_arm(robot, scene))
+
+
+def _one_chosen(kinds: dict[str, bool]) -> str:
+    """The only option that was given, of these; UsageError if there are none or several."""
+    chosen = [name for name, is_chosen in kinds.items() if is_chosen]
+    if len(chosen) != 1:
+        listed = ", ".join(kinds)
+        raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(chosen)}" if chosen else ""))
+    return chosen[0]
 
 
 def _write_urdf(arm: Arm, out: str | None) -> None:

@@ -27,6 +27,7 @@ from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
+    from armkin.inverse.elimination.closed_loop import Loop
     from armkin.inverse.elimination.pencil import Pencil
     from armkin.inverse.solvers.redundancy import Redundancy
     from armkin.inverse.tasks.task import Task
@@ -87,21 +88,10 @@ def candidates_code(
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
     loop, passes = elimination.loop, len(kinds[0])
-    numbers = {"LENGTH": loop.length, "RESIDUAL": (loop.length / arm.reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
-    numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY_ENTRY}
-    lines = [f"#define ARM_{name} {value}" for name, value in _array_sizes(pencils, passes).items()]
-    lines += [f"#define ARM_{name} {c_and_js_code.number_text(value)}" for name, value in numbers.items()]
-    moves = np.concatenate(moves_of(passes))
-    lines += [
+    lines = [
+        *_definitions(loop.length, arm.reach, _array_sizes(pencils, passes)),
         "",
-        "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
-        _array_code("from_base", frame_rows(inverse(loop.base))),
-        _array_code("from_tool", frame_rows(inverse(loop.tool))),
-        _array_code("loop_links", np.concatenate([frame_rows(link) for link in loop.links])),
-        _flags_code("loop_slides", loop.prismatic),
-        _array_code("weights", weights(5 if task.orientation == "axis" else 6)),
-        _array_code("shakes", SHAKES[:passes]),
-        _array_code("shaking", moves),
+        *_chain_arrays(loop, task, passes),
         "",
         *(_pencil_code(k, pencil) for k, pencil in enumerate(pencils)),
         f"static const arm_pencil arm_pencils[] = {{{', '.join(f'ARM_PENCIL_{k}' for k in range(len(pencils)))}}};",
@@ -119,6 +109,29 @@ def candidates_code(
         text = text.replace("ARM_JOINTS", str(arm.n - 1)).replace("arm_candidates", "arm_other_candidates")
         text += _with_held_joint(arm, held)
     return text
+
+
+def _definitions(length: float, reach: float, array_sizes: dict[str, int]) -> list[str]:
+    """The lines that define array sizes and the numbers that the method reads; length: the loop's unit [mm]."""
+    numbers = {"LENGTH": length, "RESIDUAL": (length / reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
+    numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY_ENTRY}
+    texts = {name: str(size) for name, size in array_sizes.items()}
+    texts |= {name: c_and_js_code.number_text(value) for name, value in numbers.items()}
+    return [f"#define ARM_{name} {text}" for name, text in texts.items()]
+
+
+def _chain_arrays(loop: Loop, task: Task, passes: int) -> list[str]:
+    """The arrays of the loop's frames, of the residual's weights and of how each pass moves the pose."""
+    return [
+        "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
+        _array_code("from_base", frame_rows(inverse(loop.base))),
+        _array_code("from_tool", frame_rows(inverse(loop.tool))),
+        _array_code("loop_links", np.concatenate([frame_rows(link) for link in loop.links])),
+        _flags_code("loop_slides", loop.prismatic),
+        _array_code("weights", weights(5 if task.orientation == "axis" else 6)),
+        _array_code("shakes", SHAKES[:passes]),
+        _array_code("shaking", np.concatenate(moves_of(passes))),
+    ]
 
 
 def _array_sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
@@ -161,12 +174,10 @@ def _pencil_code(number: int, pencil: Pencil) -> str:
     texts = [_array_code(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     role = pencil.role
+    numbers = (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), 15 - ends.rank, r, w, pencil.size)
     fields = [
         c_and_js_code.number_text(float(pencil.psi)),
-        *map(
-            str,
-            (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), 15 - ends.rank, r, w, pencil.size),
-        ),
+        *map(str, numbers),
         f"{{{', '.join(map(str, role.order))}}}",
         f"{{{', '.join(str(int(p)) for p in pencil.prismatic)}}}",
         *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),
@@ -189,9 +200,8 @@ def _pad_to_fours(rows: Array) -> Array:
 
 def _with_virtual_joint() -> str:
     """`arm_candidates` of five joints and the tool's axis, by way of the pose that `solvers.tool_axis` makes."""
-    code = c_and_js_code.write_code(
-        recording.record(tool_axis.pose_of, 6), [f"axis[{k} * ARM_LANES + i]" for k in range(6)]
-    )
+    inputs = [f"axis[{k} * ARM_LANES + i]" for k in range(6)]
+    code = c_and_js_code.write_code(recording.record(tool_axis.pose_of, 6), inputs)
     lines = [*code.lines, *(f"goal[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
     return part_text("virtual_joint").replace("@lines@", "\n        ".join(lines))
 

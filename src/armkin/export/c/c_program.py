@@ -47,9 +47,9 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
     turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
-    task, geometry, spare, numbered = _class_of(turned, task_name)
-    solve, branches = candidates_code(turned, task, geometry, single, held=spare)
-    names = branch_names(turned, task, geometry, branches)
+    method = _method_of(turned, task_name)
+    task, geometry = method.task, method.geometry
+    candidates, branches = candidates_code(turned, task, geometry, single, held=method.held)
     prefix = identifier(arm.name)
     units = ["mm" if slides else "rad" for slides in arm.prismatic]
     joints = ", ".join(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, units, strict=True))
@@ -58,9 +58,21 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "stem": Path(file).stem,
         "joints_are": comment_text(joints),
     }
-    fields = {
+    fields = _fields(arm, task, geometry, branches, single) | {name: f"@{name}@" for name in words}
+    source = _source_text(arm, task, candidates, single)
+    test = golden_test(arm, task, part_text("test"), single, method.numbered)
+    texts = (part_text("header"), source, test)
+    return Program(*(fill_fields(_prefix_names(fill_fields(text, fields), prefix), words) for text in texts))
+
+
+def _fields(arm: Arm, task: Task, geometry: Geometry, branches: int, single: bool) -> dict[str, str]:
+    """Texts of the @names@ in the fixed parts, but for those that people have named."""
+    turned = actual_arm(arm)
+    names = branch_names(turned, task, geometry, branches)
+    other_held_values = part_text("other_held_values").replace("@reach@", number_text(arm.reach, single))
+    return {
         "keep_outs": keep_out_tables.declarations(arm) if arm.keep_out else "",
-        "guard": f"ARMKIN_{prefix.upper()}_H",
+        "guard": f"ARMKIN_{identifier(arm.name).upper()}_H",
         "real": "float" if single else "double",
         "joints": str(arm.n),
         "branches": str(branches),
@@ -73,15 +85,16 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         "reach": number_text(arm.reach, single),
         "orientation": _orientation_lines(arm, task, single),
         "most": "arm_most(target)" if task.orientation == "full" else "ARM_SOLUTION",
-        "other_held_values": part_text("other_held_values").replace("@reach@", number_text(arm.reach, single))
-        if geometry.pairs is not None
-        else "",
+        "other_held_values": other_held_values if geometry.pairs is not None else "",
         "lower": _number_list(turned.lower, single),
         "upper": _number_list(turned.upper, single),
         **_ratio_lines(arm, single),
-        **{name: f"@{name}@" for name in words},
         "slides": ", ".join(str(int(p)) for p in arm.prismatic),
     }
+
+
+def _source_text(arm: Arm, task: Task, candidates: str, single: bool) -> str:
+    """The source, its @names@ not filled in; candidates: the function `arm_candidates`."""
     parts = [
         part_text("source_head"),
         part_text("numbers_float" if single else "numbers_double"),
@@ -89,28 +102,35 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
         c_functions.forward_kinematics(arm, single),
         c_functions.jacobian_code(arm, single),
         c_functions.target_code(arm, task, single),
-        solve,
+        candidates,
         part_text("whole_turns"),
         part_text({"full": "read_pose", "axis": "read_axis"}.get(task.orientation, "read_numbers")),
         part_text("ik"),
         part_text("source_tail"),
         *([keep_out_tables.clearances_code(arm, single), keep_out_tables.free_code(arm)] if arm.keep_out else []),
     ]
-    texts = (part_text("header"), "\n".join(parts), golden_test(arm, task, part_text("test"), single, numbered))
-    return Program(*(fill_fields(_prefix_names(fill_fields(text, fields), prefix), words) for text in texts))
+    return "\n".join(parts)
 
 
-def _class_of(arm: Arm, task_name: str | None) -> tuple[Task, Geometry, Redundancy | None, bool]:
-    """The task; the class, of an arm with a redundant joint that of the others, that joint where near has it; this
-    joint; whether branches have the numbers that Python gives them."""
+class _Method(NamedTuple):
+    """How an arm's targets are solved in C."""
+
+    task: Task
+    geometry: Geometry  # the class; of an arm with a redundant joint that of the others, that joint where near has it
+    held: Redundancy | None  # the redundant joint
+    numbered: bool  # whether branches have the numbers that Python gives them
+
+
+def _method_of(arm: Arm, task_name: str | None) -> _Method:
+    """The method of an arm's class; UsageError if the task does not fit the arm."""
     spare = redundancy(arm, task_name)
     if spare is None:
         task, named = solver(arm, task_name)
         geometry = plain_form(arm, task, named)
-        return task, geometry, None, geometry is named
+        return _Method(task, geometry, held=None, numbered=geometry is named)
     geometry = plain_form(spare.rest, spare.task, spare.geometry)
-    spare, numbered = spare._replace(geometry=geometry), geometry is spare.geometry
-    return spare.task, held_by_near(arm, spare), spare, numbered
+    held = spare._replace(geometry=geometry)
+    return _Method(spare.task, held_by_near(arm, held), held, numbered=geometry is spare.geometry)
 
 
 def candidates_code(

@@ -26,7 +26,7 @@ _CLEAR = 0.02  # singular value, lengths in reaches, from which on a posture is 
 
 
 def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> str:
-    """The test program with its values filled in; fields that it shares with the other files stay as they are.
+    """The text of a test program with its values filled in; fields that the other files share stay as they are.
 
     named: branches are numbered as Python numbers them; else their numbers are not compared (-1).
     """
@@ -34,20 +34,20 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
     T = fk(arm, q)
     target = targets_of(task, T, q * arm.ratio)
     values, valid, branch = _solve_branches(arm, task, target)
-    rows = [(values[i, b], branch[i, b]) for i, b in np.argwhere(valid)]
+    lengths = _length_indices(task)
     fields = {
         "postures": str(len(q)),
         "golden_joints": _table_text(q, single),
         "golden_poses": _table_text(T.reshape(len(q), 16), single),
         "golden_targets": _table_text(target.reshape(len(q), -1), single),
         "golden_counts": ", ".join(map(str, valid.sum(axis=1))),
-        "golden_branches": _table_text(np.array([values for values, _ in rows]), single),
-        "golden_indices": ", ".join(str(index if named else -1) for _, index in rows),
-        "rows": str(len(rows)),
-        "turns": ", ".join(number_text(float(v), single) for v in np.where(arm.prismatic, 0.0, arm.ratio**2)),
-        "home": ", ".join(number_text(float(v), single) for v in arm.home),
+        "golden_branches": _table_text(values[valid], single),
+        "golden_indices": ", ".join(str(index if named else -1) for index in branch[valid]),
+        "rows": str(valid.sum()),
+        "turns": _row_text(np.where(arm.prismatic, 0.0, arm.ratio**2), single),
+        "home": _row_text(arm.home, single),
         # millimetres of a pose or a slide, and everything else
-        "lengths": ", ".join("1" if k in _length_indices(task) else "0" for k in range(target[0].size)),
+        "lengths": ", ".join("1" if k in lengths else "0" for k in range(target[0].size)),
         "length": number_text((1e-5 if single else 1e-10) * arm.reach, single),
         "angle": number_text(2e-3 if single else 1e-7, single),
     }
@@ -94,5 +94,10 @@ def _least_singular_values(arm: Arm, task: Task, q: Array, valid: Bool) -> Array
 
 
 def _table_text(values: Array, single: bool) -> str:
-    rows = ["{" + ", ".join(number_text(float(v), single) for v in row) + "}" for row in values]
-    return ",\n    ".join(rows)
+    """Rows (N, k) as initialisers of C, a line a row."""
+    return ",\n    ".join(f"{{{_row_text(row, single)}}}" for row in values)
+
+
+def _row_text(values: Array, single: bool) -> str:
+    """Numbers (k,) as C99, between commas."""
+    return ", ".join(number_text(float(v), single) for v in values)

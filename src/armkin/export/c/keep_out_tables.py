@@ -36,18 +36,19 @@ def pair_tables(arm: Arm) -> Tables:
     held = guard(arm)
     form = held.bodies
     solid = sorted({int(form.owner[k]) for k in held.moving})
-    shapes = [
-        (_KINDS[kind], list(map(float, values)))
-        for kind, values in (solid_shape.c_function() for _, solid_shape in held.obstacles)
-    ]
-    segment_pairs = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1 + len(shapes) * len(solid)
+    shapes = []
+    for _, obstacle in held.obstacles:
+        kind, values = obstacle.c_function()
+        shapes.append((_KINDS[kind], list(map(float, values))))
+    pair_of_crossing = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1
+    pair_of_crossing += len(shapes) * len(solid)  # pairs of a body and an obstacle are numbered first
     return Tables(
-        form.radius[form.owner].tolist(),
-        len(solid),
-        [(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
-        shapes,
-        list(zip(held.ours.tolist(), held.theirs.tolist(), segment_pairs.tolist(), strict=True)),
-        [held.pair_names(k) for k in range(len(held.pairs))],
+        thick=form.radius[form.owner].tolist(),
+        solid=len(solid),
+        moving=[(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
+        shapes=shapes,
+        crossings=list(zip(held.ours.tolist(), held.theirs.tolist(), pair_of_crossing.tolist(), strict=True)),
+        pairs=[held.pair_names(k) for k in range(len(held.pairs))],
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -124,20 +125,18 @@ def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]
     """The function `candidates` of an arm's class, and how many branches it has."""
     if geometry.pairs is None:
         return js_elimination.elimination_code(arm, task, geometry.elimination), js_elimination.BRANCHES
-    n, entries = arm.n, arm_formulas.goal_size(task)
-    declared = [(f"g{k}", f"goal[{k}]") for k in range(entries)]
-    for j in range(n):
-        # a joint's preferred value is needed where the joint is free alone, and computed there
-        preferred = [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
-        declared += [(text, "") for text in preferred]
+    goal = {f"g{k}": f"goal[{k}]" for k in range(arm_formulas.goal_size(task))}
     recorded = arm_formulas.record_candidates(arm, task, geometry, measured=True)
-    code = c_and_js_code.write_code(recorded, [name for name, _ in declared], c_and_js_code.JAVASCRIPT)
+    code = c_and_js_code.write_code(recorded, [*goal, *_preferred_inputs(arm)], c_and_js_code.JAVASCRIPT)
     *values, miss, length, angle, _ = arm_formulas.by_branch(recorded, code)
-    stores = [f"q[{b * n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
-    stores += [f"miss[{k}] = {text};" for k, text in enumerate([*miss, *length, *angle])]
     doubts = dict.fromkeys(text for text in code.outputs[-1] if not text.startswith("0.0"))
-    lines = [*(f"const {name} = {text};" for name, text in declared if text), *code.lines, *stores]
-    lines.append(f"return Boolean({' | '.join(doubts) or 0});")
+    lines = [
+        *(f"const {name} = {text};" for name, text in goal.items()),
+        *code.lines,
+        *(f"q[{b * arm.n + j}] = {values[j][b]};" for b in range(len(miss)) for j in range(arm.n)),
+        *(f"miss[{k}] = {text};" for k, text in enumerate([*miss, *length, *angle])),
+        f"return Boolean({' | '.join(doubts) or 0});",
+    ]
     head = (
         "/** Candidate branches; squared residuals, then of lengths and of angles alone; whether it is at an edge.\n"
         " * @param {Numbers} goal @param {Numbers} near @param {Float64Array} q @param {Float64Array} miss\n"
@@ -147,7 +146,14 @@ def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]
     return _function_text(head, lines), len(miss)
 
 
+def _preferred_inputs(arm: Arm) -> Iterator[str]:
+    """What a joint that is free is set to: a slide's `near`, of a turn cosine and sine; computed where it is read."""
+    for j in range(arm.n):
+        yield from [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
+
+
 def _joint_function(name: str, recorded: recording.Recording) -> str:
+    """A function that writes a recording's outputs for joint values q into an array."""
     inputs = [f"q{j}" for j in range(len(recorded.inputs))]
     code = c_and_js_code.write_code(recorded, inputs, c_and_js_code.JAVASCRIPT)
     lines = [f"const {q} = q[{j}];" for j, q in enumerate(inputs)]
@@ -170,6 +176,7 @@ def _kinematics(turned: Arm, task: Task) -> list[str]:
 
 
 def _exported_lines(arm: Arm, task: Task) -> list[str]:
+    """The module's constants: names, limits, home, labels."""
     limits = [[None if np.isinf(v) else v for v in row] for row in np.stack([arm.lower, arm.upper], axis=1).tolist()]
     return [
         "/** The joints. */",
