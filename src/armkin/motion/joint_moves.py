@@ -1,6 +1,6 @@
-"""Coordinated moves: joint values in, a trajectory of straight lines in joint space out.
+"""Coordinated joint moves: trajectories of straight lines in joint space through given joint values.
 
-What a move may not do is refused here, before anything moves: joints outside their limits, missing rates.
+Moves with joints outside their limits or without rates raise an error here, before the arm moves.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: f
 
 
 def check_share(name: str, value: float) -> None:
-    """Raise UsageError for a fraction of a limit that is no plan's: below MIN_SHARE, or above 1."""
+    """Raise UsageError for a fraction of a limit below MIN_SHARE or above 1."""
     if not MIN_SHARE <= value <= 1:
         low = 100 * MIN_SHARE
         raise UsageError(f"{name} {100 * value:g} % is not possible; it goes from {low:g} to 100 percent")
@@ -61,37 +61,37 @@ def straight_move(
 
     speed, share: fractions of max_speed and max_accel; jerk: (n,) [rad/s3 | mm/s3].
 
-    A motor that turns several joints keeps to `motor_accel`, so that a hold, of which a board knows motors
-    only, is within the joints' max_accel; with its whole steps, too, which on a way of few are more than the joints'.
+    A motor that drives several joints keeps to `motor_accel`, since a board brakes motors and not joints on a hold, and
+    the joints' max_accel must hold then, too. On a short move its rounded whole steps count as well.
     """
     change = np.abs(end - start)
     moving = change > 1e-12
     if not moving.any():
         return Straight(start, end, rest_profile(0.0))
-    top = float((arm.max_speed[moving] / change[moving]).min()) * speed
+    top_speed = float((arm.max_speed[moving] / change[moving]).min()) * speed
     accel = float((arm.max_accel[moving] / change[moving]).min())
-    turned = np.abs(arm.motor_gain @ (end - start))
+    motor_travel = np.abs(arm.motor_gain @ (end - start))
     if arm.motors and not undriven_joints(arm):
-        turned = np.maximum(turned, np.abs(np.diff(pulses(arm, [start, end]), axis=0)[0]))
-    if turned.any():
-        accel = min(accel, float((motor_accel(arm)[turned > 0] / turned[turned > 0]).min()))
+        motor_travel = np.maximum(motor_travel, np.abs(np.diff(pulses(arm, [start, end]), axis=0)[0]))
+    if motor_travel.any():
+        accel = min(accel, float((motor_accel(arm)[motor_travel > 0] / motor_travel[motor_travel > 0]).min()))
     accel *= share
     if jerk is None:
-        return Straight(start, end, trapezoid(1.0, top, accel))
-    return Straight(start, end, seven_phases(1.0, top, accel, float((jerk[moving] / change[moving]).min())))
+        return Straight(start, end, trapezoid(1.0, top_speed, accel))
+    return Straight(start, end, seven_phases(1.0, top_speed, accel, float((jerk[moving] / change[moving]).min())))
 
 
 def approach_move(
-    arm: Arm, standing: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
+    arm: Arm, present: Array, start: Array, speed: float = 1.0, share: float = 1.0, jerk: Array | None = None
 ) -> Trajectory | None:
-    """The joint move from where an arm stands, (n,), to where a plan starts; None if it stands there.
+    """The joint move from the arm's joint values (n,) to a plan's start; None if they are the same.
 
-    An arm whose motors have the same counts in both stands there. speed, share, jerk: as in `straight_move`.
+    They are the same if the motors have the same counts in both. speed, share, jerk: as in `straight_move`.
     """
-    near = np.abs(start - standing).max() <= 1e-12
-    if near or (arm.motors and not undriven_joints(arm) and np.array_equal(pulses(arm, start), pulses(arm, standing))):
+    same = np.abs(start - present).max() <= 1e-12
+    if same or (arm.motors and not undriven_joints(arm) and np.array_equal(pulses(arm, start), pulses(arm, present))):
         return None
-    return Trajectory(arm, standing, (straight_move(arm, standing, start, speed, share, jerk),))
+    return Trajectory(arm, present, (straight_move(arm, present, start, speed, share, jerk),))
 
 
 def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
@@ -120,34 +120,34 @@ _EXAMPLES = {("deg", "max_speed"): 30, ("deg", "max_accel"): 60, ("mm", "max_spe
 
 
 def rate_lines(arm: Arm) -> list[str]:
-    """What `missing_rates` finds, as lines of a robot file to add."""
+    """Lines that add the `missing_rates` to a robot file."""
     unit = {name: "mm" if slides else "deg" for name, slides in zip(arm.joint_names, arm.prismatic, strict=True)}
     lines = []
     for key, names in missing_rates(arm).items():
         for size in ("deg", "mm"):
-            lacking = [name for name in names if unit[name] == size]
-            if lacking:
-                per = "s" if key == "max_speed" else "s2"
+            joints = [name for name in names if unit[name] == size]
+            if joints:
+                time = "s" if key == "max_speed" else "s2"
                 example = _EXAMPLES[size, key]
-                to = f"to joint{'s' * (len(lacking) > 1)} {', '.join(lacking)}"
-                lines.append(f"{key}: {example}   # {size}/{per}, for example; {to}")
+                note = f"to joint{'s' * (len(joints) > 1)} {', '.join(joints)}"
+                lines.append(f"{key}: {example}   # {size}/{time}, for example; {note}")
     return lines
 
 
 def check_rates(arm: Arm) -> None:
     """Raise UsageError, naming every joint, if a max_speed or max_accel is missing."""
-    absent = missing_rates(arm)
-    if absent:
-        said_of = [f"joint{'s' * (len(n) > 1)} {', '.join(n)} ha{'ve' if len(n) > 1 else 's'} no {key}"
-                   for key, n in absent.items()]  # fmt: skip
+    missing = missing_rates(arm)
+    if missing:
+        complaints = [f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}"
+                   for key, names in missing.items()]  # fmt: skip
         lines = rate_lines(arm)
         raise UsageError(
-            f"{', '.join(said_of)}: motion needs {'them' if len(lines) > 1 else 'one'}{_advice_to_add(arm, lines)}",
+            f"{', '.join(complaints)}: motion needs {'them' if len(lines) > 1 else 'one'}{_advice_to_add(arm, lines)}",
             robot_file=arm.path,
             lines_to_add=lines,
         )
 
 
 def _advice_to_add(arm: Arm, lines: list[str]) -> str:
-    """The lines to add, said of the robot file."""
+    """The advice, for the error text, to add lines to the robot file."""
     return "".join([f"; add to {arm.path or arm.name}:", *(f"\n  {line}" for line in lines)])

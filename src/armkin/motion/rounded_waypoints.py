@@ -68,28 +68,28 @@ def round_waypoints(
 
 
 def _rounded_way(corners: Array, blend: float) -> Knots:
-    """The way with a point of the grid every so often; corners (w, n) no two of which are the same."""
+    """The rounded polyline as knots; corners: (w, n), each different from the one before."""
     side = np.diff(corners, axis=0)
     length = np.linalg.norm(side, axis=1)
-    way = side / length[:, None]
+    direction = side / length[:, None]
     cut = np.concatenate([[0.0], np.minimum(blend, np.minimum(length[:-1], length[1:]) / 2), [0.0]])
-    q, d, s = [corners[:1]], [way[:1]], [np.zeros(1)]
+    q, d, s = [corners[:1]], [direction[:1]], [np.zeros(1)]
     f = np.linspace(0.0, 1.0, _NODE_COUNT + 1)[1:, None]
     length_before = 0.0
-    for k in range(len(side)):
-        a = corners[k] + cut[k] * way[k]
-        straight = length[k] - cut[k] - cut[k + 1]
-        if straight > 1e-9 * length[k]:
-            q.append(a + f * straight * way[k])
-            d.append(np.repeat(way[k : k + 1], _NODE_COUNT, axis=0))
-            s.append(length_before + f[:, 0] * straight)
-            length_before += straight
-        if k + 1 < len(side):  # a parabola: from the one side to the other, its tangents the sides
-            r = cut[k + 1]
-            begin, corner = corners[k + 1] - r * way[k], corners[k + 1]
-            end = corner + r * way[k + 1]
+    for i in range(len(side)):
+        a = corners[i] + cut[i] * direction[i]
+        straight_length = length[i] - cut[i] - cut[i + 1]
+        if straight_length > 1e-9 * length[i]:
+            q.append(a + f * straight_length * direction[i])
+            d.append(np.repeat(direction[i : i + 1], _NODE_COUNT, axis=0))
+            s.append(length_before + f[:, 0] * straight_length)
+            length_before += straight_length
+        if i + 1 < len(side):  # a parabola whose tangents are the two sides
+            r = cut[i + 1]
+            begin, corner = corners[i + 1] - r * direction[i], corners[i + 1]
+            end = corner + r * direction[i + 1]
             q.append((1 - f) ** 2 * begin + 2 * f * (1 - f) * corner + f**2 * end)
-            d.append((1 - f) * way[k] + f * way[k + 1])
+            d.append((1 - f) * direction[i] + f * direction[i + 1])
             s.append(length_before + 2 * r * f[:, 0])
             length_before += 2 * r
     return Knots(np.concatenate(s), np.concatenate(q), np.concatenate(d))

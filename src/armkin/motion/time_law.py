@@ -1,4 +1,4 @@
-"""`armkin.time_law`: the fastest law of time along joint values that are given."""
+"""`armkin.time_law`: the fastest timing of a given joint path."""
 
 from __future__ import annotations
 
@@ -62,12 +62,14 @@ def time_law(
     """
     check_rates(arm)
     values = as_joints(arm, q)
-    way = np.arange(len(values), dtype=float) if s is None else np.asarray(s, dtype=float)
-    if values.ndim != 2 or len(values) < 5 or way.shape != values.shape[:1]:
-        raise UsageError(f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {way.shape}")
-    if not (np.isfinite(values).all() and np.isfinite(way).all() and (np.diff(way) > 0).all()):
+    parameter = np.arange(len(values), dtype=float) if s is None else np.asarray(s, dtype=float)
+    if values.ndim != 2 or len(values) < 5 or parameter.shape != values.shape[:1]:
+        raise UsageError(
+            f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {parameter.shape}"
+        )
+    if not (np.isfinite(values).all() and np.isfinite(parameter).all() and (np.diff(parameter) > 0).all()):
         raise UsageError("samples must be finite, and s must increase from each to the next")
-    path = refine_knots(knots_of_samples(way, values))
+    path = refine_knots(knots_of_samples(parameter, values))
     cap = np.full(len(path.s), np.inf)
     if tool_speed is not None:
         tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
@@ -77,7 +79,7 @@ def time_law(
         cap = np.minimum(cap, hold_cap(arm, path, hold))
     limits: Array = arm.max_accel * accel
     curve = Curve(path, optimal_law(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel)))
-    made: Curve | Smoothed = curve
+    stretch: Curve | Smoothed = curve
     if jerk is not None:
-        made = Smoothed(curve, smoothing_window(limits, jerk))
-    return Trajectory(arm, values[0], (made,))
+        stretch = Smoothed(curve, smoothing_window(limits, jerk))
+    return Trajectory(arm, values[0], (stretch,))

@@ -1,8 +1,8 @@
-"""Chains of linked branches, how far each carries within the limits, and the fewest runs that carry all.
+"""Chains of linked branches, how far each carries within the limits, and the fewest runs that carry a route.
 
-A chain is one branch over a range of samples, its joint values continuous. Within the limits it is one of its
-whole-turn copies, the same along a run; joints choose their copies one by one. A run ends where a joint meets its
-limit, or where the branch itself ends.
+A chain is one branch over a range of samples with continuous joint values. Whole turns of a joint make copies of it;
+on a run every joint keeps the copy that stays within its limits. A run ends where a joint meets its limit or where the
+branch itself ends.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Chain:
     first: int
     q: Array  # (len, n)
     labels: Int  # (len,) number of the branch's name, -1: none
-    windows: tuple[Window, ...] = ()  # where its wrist passes a singularity with the tool turned a little
+    windows: tuple[Window, ...] = ()  # stretches on which the wrist passes a singularity
 
     @property
     def last(self) -> int:
@@ -48,40 +48,40 @@ class Chain:
 
     @cached_property
     def _copies(self) -> list[tuple[Array, Int | None]]:
-        """For every joint the offsets of its copies (k,), and the first illegal sample from each on: (k, len).
+        """Offsets (k,) of every joint's copies, and the next illegal sample of each copy from each sample: (k, len).
 
-        None: all are legal everywhere.
+        None in place of the second: all copies are legal everywhere.
         """
         copies: list[tuple[Array, Int | None]] = []
-        least, most = self.extent
+        least, greatest = self.extent
         turns = whole_turns(self.arm)
-        for j in range(self.arm.n):
-            lower, upper, value = self.arm.lower[j] - SLACK, self.arm.upper[j] + SLACK, self.q[:, j]
-            offsets, turn = np.zeros(1), turns[j]
-            if not self.arm.prismatic[j] and np.isfinite(lower) and np.isfinite(upper):
-                first = np.ceil((lower - most[j]) / turn)
-                last = np.floor((upper - least[j]) / turn)
+        for joint in range(self.arm.n):
+            lower, upper, value = self.arm.lower[joint] - SLACK, self.arm.upper[joint] + SLACK, self.q[:, joint]
+            offsets, turn = np.zeros(1), turns[joint]
+            if not self.arm.prismatic[joint] and np.isfinite(lower) and np.isfinite(upper):
+                first = np.ceil((lower - greatest[joint]) / turn)
+                last = np.floor((upper - least[joint]) / turn)
                 offsets = turn * np.arange(first, last + 1)
-            elif not self.arm.prismatic[j] and (np.isfinite(lower) or np.isfinite(upper)):
-                middle = np.rint((self.arm.home[j] - value[0]) / turn)
+            elif not self.arm.prismatic[joint] and (np.isfinite(lower) or np.isfinite(upper)):
+                middle = np.rint((self.arm.home[joint] - value[0]) / turn)
                 offsets = turn * (middle + np.arange(-2, 3))
-            legal = (least[j] + offsets >= lower) & (most[j] + offsets <= upper)
+            legal = (least[joint] + offsets >= lower) & (greatest[joint] + offsets <= upper)
             if len(offsets) and legal.all():
                 copies.append((offsets, None))
                 continue
-            end = np.full((len(offsets), len(value)), len(value))
+            next_illegal = np.full((len(offsets), len(value)), len(value))
             shifted = value + offsets[~legal, None]
             illegal = (shifted < lower) | (shifted > upper)
-            until = np.where(illegal, np.arange(len(value)), len(value))
-            end[~legal] = np.minimum.accumulate(until[:, ::-1], axis=1)[:, ::-1]
-            copies.append((offsets, end))
+            illegal_sample = np.where(illegal, np.arange(len(value)), len(value))
+            next_illegal[~legal] = np.minimum.accumulate(illegal_sample[:, ::-1], axis=1)[:, ::-1]
+            copies.append((offsets, next_illegal))
         return copies
 
     @cached_property
     def _joint_reach(self) -> Int:
-        """The first sample, counted from `first`, that each joint cannot go on to, from every sample: (len, n)."""
+        """The first sample, counted from `first`, that each joint cannot reach from every sample: (len, n)."""
         N = len(self.q)
-        own = np.arange(N)  # where a joint without copies ends; no copy ends earlier
+        own = np.arange(N)  # a joint without a legal copy ends at the sample itself
         ends = [
             np.full(N, N) if end is None else np.maximum(own, end.max(axis=0, initial=0)) for _, end in self._copies
         ]
@@ -89,7 +89,7 @@ class Chain:
 
     @cached_property
     def reach(self) -> Int:
-        """The last sample that each sample's run carries to, absolute; one less than itself: illegal. (len,)."""
+        """The last sample that a run from each sample carries to, absolute; one less than itself: illegal. (len,)."""
         if self.hit_from is None and all(end is None for _, end in self._copies):
             return np.full(len(self.q), self.last)
         reach = self._joint_reach.min(axis=1)
@@ -97,7 +97,7 @@ class Chain:
 
     @cached_property
     def hit_from(self) -> Int | None:
-        """The first sample, counted from `first`, at which the arm hits something, from each on; None: nowhere."""
+        """The first sample, counted from `first`, with a hit at or behind each sample: (len,); None: no hits."""
         hit = motion_hits(self.arm, self.q)
         if hit is None or not hit.any():
             return None
@@ -109,7 +109,7 @@ class Chain:
         return self.hit_from is not None and self.hit_from[i - self.first] < self._joint_reach[i - self.first].min()
 
     def carries_to(self, i: int) -> int:
-        """Last sample of a run from sample i, i - 1 if there is none."""
+        """The last sample of a run from sample i; i - 1 if no run starts there."""
         return int(self.reach[i - self.first]) if self.first <= i <= self.last else i - 1
 
     def limiting_joint(self, i: int) -> int | None:
@@ -117,18 +117,18 @@ class Chain:
         ends = self._joint_reach[i - self.first]
         return int(ends.argmin()) if ends.min() < len(self.q) else None
 
-    def joints(self, i: int, e: int, near: Array, fixed: Array | None = None) -> Array:
-        """Joint values from sample i to e (e - i + 1, n), the legal copies nearest to `near` at i."""
+    def joints(self, i: int, last: int, near: Array, fixed: Array | None = None) -> Array:
+        """Joint values (last - i + 1, n) from sample i to `last`, in the legal copy nearest to `near` at sample i."""
         offsets, turns = np.zeros(self.arm.n), whole_turns(self.arm)
-        for j, (choices, ends) in enumerate(self._copies):
-            value = self.q[i - self.first, j]
-            if not self.arm.prismatic[j] and not np.isfinite([self.arm.lower[j], self.arm.upper[j]]).any():
-                offsets[j] = turns[j] * np.rint((near[j] - value) / turns[j])
+        for joint, (choices, ends) in enumerate(self._copies):
+            value = self.q[i - self.first, joint]
+            if not self.arm.prismatic[joint] and not np.isfinite([self.arm.lower[joint], self.arm.upper[joint]]).any():
+                offsets[joint] = turns[joint] * np.rint((near[joint] - value) / turns[joint])
                 continue
-            legal = choices if ends is None else choices[ends[:, i - self.first] > e - self.first]
-            nearest = near[j] if fixed is None else fixed[j]
-            offsets[j] = legal[np.abs(value + legal - nearest).argmin()]
-        return np.asarray(self.q[i - self.first : e - self.first + 1] + offsets)
+            legal = choices if ends is None else choices[ends[:, i - self.first] > last - self.first]
+            nearest = near[joint] if fixed is None else fixed[joint]
+            offsets[joint] = legal[np.abs(value + legal - nearest).argmin()]
+        return np.asarray(self.q[i - self.first : last - self.first + 1] + offsets)
 
 
 def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
@@ -138,37 +138,40 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     identity = np.where(valid[:-1], np.arange(B), -1) == columns.partner
     steady = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
     events = np.append(np.flatnonzero(~steady), N - 1)
-    open_: dict[int, list[tuple[int, int, int]]] = {int(b): [] for b in np.flatnonzero(valid[0])}  # column -> blocks
+    open_chains: dict[int, list[tuple[int, int, int]]] = {
+        int(column): [] for column in np.flatnonzero(valid[0])
+    }  # column: blocks
     ended: list[list[tuple[int, int, int]]] = []
     begin = 0
     for event in events.tolist():
-        for b, blocks in open_.items():
-            blocks.append((begin, event, b))
+        for column, blocks in open_chains.items():
+            blocks.append((begin, event, column))
         if event == N - 1:
             break
         partner = columns.partner[event]
-        going = {int(partner[b]): blocks for b, blocks in open_.items() if partner[b] >= 0}
-        ended += [blocks for b, blocks in open_.items() if partner[b] < 0]
-        open_ = {int(b): going.get(int(b), []) for b in np.flatnonzero(valid[event + 1])}
+        continued = {int(partner[column]): blocks for column, blocks in open_chains.items() if partner[column] >= 0}
+        ended += [blocks for column, blocks in open_chains.items() if partner[column] < 0]
+        open_chains = {int(column): continued.get(int(column), []) for column in np.flatnonzero(valid[event + 1])}
         begin = event + 1
-    ended += list(open_.values())
+    ended += list(open_chains.values())
     return [_assemble_chain(arm, columns, blocks) for blocks in ended]
 
 
 def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
     size = blocks[-1][1] + 1 - blocks[0][0]
-    # one joint after another in memory: whatever is asked of a chain is asked of its joints
-    q = np.concatenate([columns.q[a : b + 1, c].T for a, b, c in blocks], axis=1, out=np.empty((arm.n, size))).T
-    labels = np.concatenate([columns.name[a : b + 1, c] for a, b, c in blocks])
-    made = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
-    least, most = made.extent
-    for j in np.flatnonzero(~arm.prismatic & (most - least > np.pi)):  # principal values may jump by a turn
-        turn = whole_turns(arm)[j]
-        turns = np.rint(np.diff(q[:, j]) / turn)
+    # memory order joint by joint, since limits and copies are evaluated joint by joint
+    parts = [columns.q[a : b + 1, column].T for a, b, column in blocks]
+    q = np.concatenate(parts, axis=1, out=np.empty((arm.n, size))).T
+    labels = np.concatenate([columns.name[a : b + 1, column] for a, b, column in blocks])
+    chain = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
+    least, greatest = chain.extent
+    for joint in np.flatnonzero(~arm.prismatic & (greatest - least > np.pi)):  # principal values may jump by a turn
+        turn = whole_turns(arm)[joint]
+        turns = np.rint(np.diff(q[:, joint]) / turn)
         if turns.any():
-            q[1:, j] -= turn * np.cumsum(turns)
-            made.__dict__.pop("extent", None)
-    return made
+            q[1:, joint] -= turn * np.cumsum(turns)
+            chain.__dict__.pop("extent", None)
+    return chain
 
 
 @dataclass(frozen=True)
@@ -181,28 +184,28 @@ class Run:
 
 
 def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
-    """Runs one after another, each carrying as far as any can; a gap where nothing carries.
+    """The fewest runs in order, each as long as any chain allows; no run covers samples that no chain carries.
 
-    allowed: the chains that may begin (those at the start's branch). Of runs that carry equally far the one with
-    the least motion: the sum over the samples of the greatest |dq| / max_speed.
+    allowed: the chains on which the first run may begin. Among equally long runs the one with the least motion is
+    taken, which is the sum over the samples of the greatest |dq| / max_speed.
     """
     runs: list[Run] = []
     i, alive = 0, _possible_starts(chains, N)
     while i < N:
         choices = allowed if allowed is not None and not runs and i == 0 else chains
-        far = max((chain.carries_to(i) for chain in choices), default=i - 1)
-        if far < i or (far == i and i < N - 1 and runs and runs[-1].last == i):
+        last = max((chain.carries_to(i) for chain in choices), default=i - 1)
+        if last < i or (last == i and i < N - 1 and runs and runs[-1].last == i):
             i += 1 + int(alive[i + 1 :].argmax())
             continue
-        runs.append(_least_motion_run(choices, i, far))
-        if far >= N - 1:
+        runs.append(_least_motion_run(choices, i, last))
+        if last >= N - 1:
             break
-        i = far if any(c.carries_to(far) > far for c in chains) else far + 1
+        i = last if any(c.carries_to(last) > last for c in chains) else last + 1
     return runs
 
 
 def _possible_starts(chains: list[Chain], N: int) -> Bool:
-    """Samples at which some run may begin, and the end: (N + 1,)."""
+    """Whether a run may begin at each sample: (N + 1,), true for the end behind the last one."""
     alive = np.zeros(N + 1, bool)
     alive[N] = True
     for chain in chains:
@@ -217,38 +220,38 @@ def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
     return Run(best, i, last_sample)
 
 
-def least_time(chain: Chain, i: int, e: int) -> float:
-    """A lower bound of the seconds from sample i to e: no joint faster than its max_speed."""
-    q = chain.q[i - chain.first : e - chain.first + 1]
+def least_time(chain: Chain, i: int, last: int) -> float:
+    """A lower bound [s] of the time from sample i to `last`, from the joints' max_speed."""
+    q = chain.q[i - chain.first : last - chain.first + 1]
     speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
     seconds = np.zeros(max(len(q) - 1, 0))
-    for j in range(chain.arm.n):  # joint by joint: numpy's maximum over a short last axis is slow
+    for j in range(chain.arm.n):  # joint by joint, since numpy's maximum over a short last axis is slow
         np.maximum(seconds, np.abs(np.diff(q[:, j])) / speed[j], out=seconds)
     return float(seconds.sum())
 
 
 def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
-    """Why a run from sample i ends: words, the joint and its limit (or None), what is beyond."""
-    e = chain.carries_to(i)
-    beyond = min(max(e + 1, 0), len(columns.s) - 1)
+    """Why a run from sample i ends: the reason, the joint and its limit (or None), the status of the next sample."""
+    last = chain.carries_to(i)
+    beyond = min(max(last + 1, 0), len(columns.s) - 1)
     status = Status(int(columns.status[beyond])).name.lower()
     if chain.ends_by_hit(i):
         return "hit", None, None, status
     joint = chain.limiting_joint(i)
     arm = chain.arm
     if joint is not None:
-        index = min(max(e + 1, chain.first), chain.last) - chain.first
-        # Over or under: compare the copy that carried farthest
-        q = chain.joints(i, e, arm.home)[-1] if e >= i else chain.q[max(i - chain.first, 0)]
+        index = min(max(last + 1, chain.first), chain.last) - chain.first
+        # extrapolate the copy that carried farthest to see which limit the joint passes
+        q = chain.joints(i, last, arm.home)[-1] if last >= i else chain.q[max(i - chain.first, 0)]
         value_beyond = q[joint] + chain.q[index, joint] - chain.q[max(index - 1, 0), joint]
         upper = abs(value_beyond - arm.upper[joint]) < abs(value_beyond - arm.lower[joint])
         limit = float(arm.upper[joint] if upper else arm.lower[joint])
         return "limit", joint, limit, status
-    if beyond == e:
+    if beyond == last:
         return "end", None, None, status
     count = columns.valid.sum(axis=1)
-    # Two branches that meet at the edge of the reach end a sample or two before it.
-    soon = (columns.s > columns.s[e]) & (columns.s < columns.s[e] + 10 * END_ACCURACY)
-    if (columns.status[soon] == Status.UNREACHABLE).any():
+    # Two branches that meet at the edge of the reach end one or two samples before it.
+    next_samples = (columns.s > columns.s[last]) & (columns.s < columns.s[last] + 10 * END_ACCURACY)
+    if (columns.status[next_samples] == Status.UNREACHABLE).any():
         return "reach", None, None, Status.UNREACHABLE.name.lower()
-    return ("boundary" if count[beyond] < count[e] else "singularity"), None, None, status
+    return ("boundary" if count[beyond] < count[last] else "singularity"), None, None, status

@@ -1,4 +1,4 @@
-"""All branches at samples of a route, each in the column of its name."""
+"""All branches at the samples of a route as arrays, in which every named branch has its own column."""
 
 from __future__ import annotations
 
@@ -22,9 +22,10 @@ from armkin.motion.branches.joint_steps import joint_change
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_NEWTON_STEPS, _MAX_MOVEMENT = 8, 1e-6  # Newton steps on a self-motion; movement [rad | mm] of a joint that is not free
-_BLOCK_SAMPLES = 16_384  # samples solved at once at most
-_STRIDE = 8  # stride of the few samples that are solved first
+_NEWTON_STEPS = 8  # Newton steps on a self-motion
+_MAX_MOVEMENT = 1e-6  # movement [rad | mm] allowed to joints that are not free
+_BLOCK_SAMPLES = 16_384  # most samples solved in one call
+_STRIDE = 8  # every 8th sample is solved first
 
 
 @dataclass
@@ -35,18 +36,18 @@ class Columns:
     q: Array  # (N, B, n), principal values; nan where there is no branch
     name: NDArray[np.int16]  # (N, B) index into names, -1: none
     status: NDArray[np.int8]  # (N,)
-    within_limits: Bool  # (N, B) within limits, of some copy
+    within_limits: Bool  # (N, B) whether some whole-turn copy is within the limits
     names: tuple[str, ...] = ()
     complete: bool = True
     partner: NDArray[np.int16] = field(default_factory=lambda: np.zeros((0, 0), np.int16))  # (N - 1, B) column, or -1
 
     @property
     def valid(self) -> Bool:
-        """Where a branch is: (N, B)."""
+        """Whether a column holds a branch: (N, B)."""
         return np.asarray(~np.isnan(self.q[:, :, 0]))
 
     def take_rows(self, rows: Int) -> Columns:
-        """Some samples, without their links."""
+        """The samples of the given rows, without their links."""
         parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within_limits[rows])
         return Columns(*parts, self.names, self.complete)
 
@@ -64,38 +65,38 @@ class Columns:
         )
 
     def insert_rows(self, rows: Int, new: Columns) -> Columns:
-        """The samples with others before the rows `rows`; the links of both stay, as far as they have any."""
+        """The columns with new samples inserted before `rows`; all samples keep their links."""
         B = max(self.q.shape[1], new.q.shape[1])
-        wide, new = self.pad_to(B), new.pad_to(B)
+        padded, new = self.pad_to(B), new.pad_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
         return Columns(
-            np.insert(wide.s, rows, new.s),
-            np.insert(wide.q, rows, new.q, axis=0),
-            np.insert(wide.name, rows, new.name, axis=0),
-            np.insert(wide.status, rows, new.status),
-            np.insert(wide.within_limits, rows, new.within_limits, axis=0),
-            wide.names,
-            wide.complete and new.complete,
-            np.insert(wide.partner, rows, links, axis=0),
+            np.insert(padded.s, rows, new.s),
+            np.insert(padded.q, rows, new.q, axis=0),
+            np.insert(padded.name, rows, new.name, axis=0),
+            np.insert(padded.status, rows, new.status),
+            np.insert(padded.within_limits, rows, new.within_limits, axis=0),
+            padded.names,
+            padded.complete and new.complete,
+            np.insert(padded.partner, rows, links, axis=0),
         )
 
 
 @dataclass
 class Samples:
-    """What solves a route at samples; near: joint values (n,) for joints that are free; length: [mm] of the route."""
+    """Solves a route at samples; near: (n,) values for joints that are free; length: [mm] of the route."""
 
     arm: Arm
     targets: Callable[[Array], Array]
     task: str | None
     near: Array
     length: float
-    stays: bool = False  # whether all of the route is singular: free joints then stay
+    stays: bool = False  # whether the whole route is singular, so that free joints keep their values
 
     def solve_first(self, s: Array) -> Columns:
-        """All branches at the first samples (N,), increasing.
+        """All branches at the first samples s (N,), increasing.
 
-        From a singular posture on, where all may be dear to examine, a few of them are solved first: between two that
-        are out of reach nobody looks.
+        Singular postures are expensive to examine. A route that starts at one is solved at every 8th sample first, and
+        samples between two unreachable ones are not solved at all.
         """
         if len(s) <= 2 * _STRIDE or self.solve_at(s[:1]).status[0] != Status.SINGULAR:
             return self.solve_at(s)
@@ -105,93 +106,93 @@ class Samples:
             self.stays = True
             return self.solve_at(s)
         unreachable = sampled.status == Status.UNREACHABLE
-        between = np.setdiff1d(np.arange(len(s)), sparse)
-        unsolved = (unreachable[:-1] & unreachable[1:])[np.searchsorted(sparse, between) - 1]
+        inner_rows = np.setdiff1d(np.arange(len(s)), sparse)
+        skipped = (unreachable[:-1] & unreachable[1:])[np.searchsorted(sparse, inner_rows) - 1]
         parts = [sampled]
-        if not unsolved.all():
-            parts.append(self.solve_at(s[between[~unsolved]]))
-        if unsolved.any():
+        if not skipped.all():
+            parts.append(self.solve_at(s[inner_rows[~skipped]]))
+        if skipped.any():
             empty, lengths = (
-                sampled.take_rows(np.flatnonzero(unreachable)[[0] * int(unsolved.sum())]),
-                s[between[unsolved]],
+                sampled.take_rows(np.flatnonzero(unreachable)[[0] * int(skipped.sum())]),
+                s[inner_rows[skipped]],
             )
             parts.append(replace(empty, s=lengths))
         columns = _concatenate(parts)
         return columns.take_rows(np.argsort(columns.s, kind="stable"))
 
     def solve_at(self, s: Array, examine: bool = True) -> Columns:
-        """All branches at samples, not linked yet; of very many in parts, to bound the memory that takes."""
+        """All branches at samples, without links; solved in blocks to bound the memory."""
         parts = [self._solve_block(s[k : k + _BLOCK_SAMPLES], examine) for k in range(0, len(s), _BLOCK_SAMPLES)]
         return parts[0] if len(parts) == 1 else _concatenate(parts)
 
     def _solve_block(self, s: Array, examine: bool) -> Columns:
         solutions = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
-        q, name, within = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
+        q, name, legal = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
         singular = np.flatnonzero(solutions.status == Status.SINGULAR)
         if len(singular):
-            # Exactly on a singularity some joints are free: 1e-7 of the path's length beside it they are determined.
-            aside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
-            aside = np.where(aside == s[singular], s[singular] - 1e-7 * self.length, aside)
-            beside = ik(self.arm, self.targets(aside), self.task, near=self.near)
-            # Where there is nothing beside it, a stretched arm's wrist for example, the posture there stays.
-            good = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
+            # Some joints are free exactly on a singularity, but determined 1e-7 of the path length beside it.
+            s_beside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
+            s_beside = np.where(s_beside == s[singular], s[singular] - 1e-7 * self.length, s_beside)
+            beside = ik(self.arm, self.targets(s_beside), self.task, near=self.near)
+            # Keep the singular posture where its neighbour has no branch, for example with a stretched arm.
+            replaced = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
             B = max(q.shape[1], beside.q.shape[1])
-            q, name, within = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(within, B, 0).copy()
-            within[singular[good]] = _pad(beside.within_limits, B, 0)[good]
-            q[singular[good]] = _pad(beside.q, B)[good]
-            name[singular[good]] = _pad(beside.branch.astype(np.int16), B, -1)[good]
-            if self.stays and len(stay := singular[~good]):
-                q[stay] = self._hold_free_joints(q[stay], self.targets(s[stay]), solutions.free[stay], within[stay])
-        return _columns_by_name(solutions, s, q, name, within)
+            q, name, legal = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(legal, B, 0).copy()
+            legal[singular[replaced]] = _pad(beside.within_limits, B, 0)[replaced]
+            q[singular[replaced]] = _pad(beside.q, B)[replaced]
+            name[singular[replaced]] = _pad(beside.branch.astype(np.int16), B, -1)[replaced]
+            if self.stays and len(kept := singular[~replaced]):
+                q[kept] = self._hold_free_joints(q[kept], self.targets(s[kept]), solutions.free[kept], legal[kept])
+        return _columns_by_name(solutions, s, q, name, legal)
 
     def _hold_free_joints(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
-        """Singular postures (M, B, n) with their free joints (M, n) as near as they can be to where the arm stands."""
-        rows, b = np.nonzero(~np.isnan(q[:, :, 0]) & within_limits)
+        """Singular postures (M, B, n) whose free joints (M, n) are moved as near as possible to `near`."""
+        rows, branches = np.nonzero(~np.isnan(q[:, :, 0]) & within_limits)
         if not len(rows):
             return q
         arm, task = self.arm, task_for(self.arm, self.task)
-        start, loose = q[rows, b], free[rows]
+        start, is_free = q[rows, branches], free[rows]
         postures, miss = correct(
-            actual_arm(arm), task, np.where(loose, self.near, start) * arm.ratio, target[rows], steps=_NEWTON_STEPS
+            actual_arm(arm), task, np.where(is_free, self.near, start) * arm.ratio, target[rows], steps=_NEWTON_STEPS
         )
         postures /= arm.ratio
-        same = np.where(loose, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _MAX_MOVEMENT
-        good = same & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
-        q[rows[good], b[good]] = postures[good]
+        others_rest = np.where(is_free, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _MAX_MOVEMENT
+        accepted = others_rest & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
+        q[rows[accepted], branches[accepted]] = postures[accepted]
         return q
 
 
 def _concatenate(parts: list[Columns]) -> Columns:
-    """Samples of all the parts, one part after another."""
+    """The samples of all parts in order, padded to the same number of columns."""
     B = max(part.q.shape[1] for part in parts)
-    wide = [part.pad_to(B) for part in parts]
+    padded = [part.pad_to(B) for part in parts]
     return Columns(
-        np.concatenate([part.s for part in wide]),
-        np.concatenate([part.q for part in wide]),
-        np.concatenate([part.name for part in wide]),
-        np.concatenate([part.status for part in wide]),
-        np.concatenate([part.within_limits for part in wide]),
+        np.concatenate([part.s for part in padded]),
+        np.concatenate([part.q for part in padded]),
+        np.concatenate([part.name for part in padded]),
+        np.concatenate([part.status for part in padded]),
+        np.concatenate([part.within_limits for part in padded]),
         max((part.names for part in parts), key=len),
         all(part.complete for part in parts),
     )
 
 
 def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool) -> Columns:
-    """Rows of solutions with every named branch in the column of its number."""
+    """Solutions as columns, each named branch moved to the column of its number."""
     B = q.shape[1]
-    wide = max(B, int(name.max(initial=-1)) + 1)
+    width = max(B, int(name.max(initial=-1)) + 1)
     status, complete = solutions.status.astype(np.int8), bool(np.all(solutions.complete))
     misplaced = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
-    q, name, within_limits = (_pad(x, wide, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
+    q, name, within_limits = (_pad(x, width, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
     if len(misplaced):
         q, name, within_limits = q.copy(), name.copy(), within_limits.copy()
         old_q, old_name, old_within = q[misplaced], name[misplaced], within_limits[misplaced]
         q[misplaced], name[misplaced], within_limits[misplaced] = np.nan, -1, False
         row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
-        place = old_name[row, column]
-        q[misplaced[row], place] = old_q[row, column]
-        name[misplaced[row], place] = place
-        within_limits[misplaced[row], place] = old_within[row, column]
+        number = old_name[row, column]
+        q[misplaced[row], number] = old_q[row, column]
+        name[misplaced[row], number] = number
+        within_limits[misplaced[row], number] = old_within[row, column]
     return Columns(s, q, name, status, within_limits, solutions.names, complete)
 
 

@@ -1,6 +1,7 @@
-"""A route in joint space: which branch carries it, as cubics in joint values with a law of time.
+"""Carries a route out in joint space: chooses the branch, fits cubics to its joint values and times them.
 
-route --columns--> linked branches --chains--> runs --here--> joint values on a grid --time law--> stretches
+The steps are route -> columns of branches -> chains -> runs -> joint values on a grid -> time law -> stretches; the
+last three are in this module.
 """
 
 from __future__ import annotations
@@ -34,30 +35,30 @@ from armkin.motors import motor_accel
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_MIN_GRID_POINTS = 1000  # points, at least, of a route's grid
-_SAMPLE_STEP = 1.0  # distance [mm], at most, between the first samples
-_SAMPLES = (200, 20_000)  # samples of a route, at least and at most
-_MANY_RESTS = 8  # rests from which on what lies between them is planned together, so many samples at once
-_CHUNK_SAMPLES = 8192  # samples between rests that are planned at once
-_MAX_DISTANCE = 2.0  # distance [mm], at most, between the samples of a path that has more
+_MIN_GRID_POINTS = 1000  # fewest points of a route's grid
+_SAMPLE_STEP = 1.0  # largest distance [mm] between the first samples
+_SAMPLES = (200, 20_000)  # fewest and most samples of a route
+_MANY_RESTS = 8  # with more rests than this, the parts between them are planned in groups
+_CHUNK_SAMPLES = 8192  # samples of such a group
+_MAX_DISTANCE = 2.0  # largest distance [mm] between the samples of a route that needs more than the most
 
 
 @dataclass(frozen=True)
 class Pace:
-    """How fast: fractions of the joints' limits, and what else bounds the motion."""
+    """The bounds of a motion: fractions of the joints' limits, tool speed, jerk, and tolerances."""
 
     speed: float = 1.0
     accel: float = 1.0
     tool_speed: float | None = None  # [mm/s]
     jerk: Array | None = None  # (n,) [rad/s3 | mm/s3]
-    hold: float | None = None  # on a hold, a joint's acceleration is at most this times its max_accel
+    hold: float | None = None  # bound of a joint's acceleration on a hold, in multiples of max_accel
     tolerance: float = 0.05  # [mm]
-    turn: float = 0.0  # [rad] that the tool may be turned by, to pass a wrist singularity
+    turn: float = 0.0  # [rad] by which the tool may turn aside to pass a wrist singularity
 
 
 @dataclass(frozen=True)
 class CarriedRoute:
-    """A route on branches: the runs, and what was found on the way."""
+    """A route with its branches and the runs that carry it."""
 
     route: Route
     columns: Columns
@@ -66,12 +67,12 @@ class CarriedRoute:
 
     @property
     def in_one_run(self) -> bool:
-        """Whether one run carries everything."""
+        """Whether a single run carries the whole route."""
         return len(self.runs) == 1 and self.runs[0].first == 0 and self.runs[0].last == len(self.columns.s) - 1
 
     @property
     def covered(self) -> bool:
-        """Whether the runs carry everything, with reconfigurations in between."""
+        """Whether the runs carry the whole route, with reconfigurations between them."""
         if not self.runs or self.runs[0].first != 0 or self.runs[-1].last != len(self.columns.s) - 1:
             return False
         s = self.columns.s  # ends of runs are known to END_ACCURACY
@@ -79,16 +80,16 @@ class CarriedRoute:
 
     @property
     def moving_runs(self) -> list[Run]:
-        """The runs that lead anywhere."""
+        """The runs that are longer than the accuracy of their ends."""
         s = self.columns.s
         return self.runs if self.in_one_run else [run for run in self.runs if s[run.last] - s[run.first] > END_ACCURACY]
 
 
 def route_samples(route: Route, count: int | None = None) -> Array:
-    """Where a route is solved first: evenly, and at the ends of its pieces."""
+    """The lengths [mm] at which a route is solved first: evenly spaced, and the ends of its pieces."""
     number = count or int(max(np.clip(np.ceil(route.length / _SAMPLE_STEP), *_SAMPLES), route.length / _MAX_DISTANCE))
-    even = np.linspace(0.0, route.length, max(number, 2))
-    return np.asarray(_drop_close_values(np.sort(np.concatenate([even, route.breaks])), 1e-7 * route.length))
+    even_lengths = np.linspace(0.0, route.length, max(number, 2))
+    return np.asarray(_drop_close_values(np.sort(np.concatenate([even_lengths, route.breaks])), 1e-7 * route.length))
 
 
 def carry_route(
@@ -102,47 +103,48 @@ def carry_route(
     branch: str | None = None,
     count: int | None = None,
 ) -> CarriedRoute:
-    """The branches that carry a route, and the best way along them.
+    """Solve a route on all branches and choose the runs that carry it.
 
     near: where the arm comes from; fixed: where it stands at the route's start, if it has no choice; branch: name
     of the branch to start on. Raises UsageError, which lists the names, if there is no branch of that name.
     """
     name = route.task.name
     columns = link_branches(arm, route.targets, route_samples(route, count), task=name, tolerance=tolerance, near=near)
-    every_chain = chains_of_columns(arm, columns)
-    every_chain = add_boundary_chains(arm, columns, every_chain, fixed, tolerance)
+    all_chains = chains_of_columns(arm, columns)
+    all_chains = add_boundary_chains(arm, columns, all_chains, fixed, tolerance)
     if route.task.orientation == "full" and has_wrist(arm):
-        aside = 0.0 if len(route.given_points[0]) else ASIDE_SHARE * tolerance  # a curve of points leaves little of it
-        every_chain = add_wrist_chains(arm, route, columns, every_chain, pace.turn, aside)
-    starts = _start_chains(arm, every_chain, fixed)
+        # a fitted curve has used most of the tolerance
+        max_offset = 0.0 if len(route.given_points[0]) else ASIDE_SHARE * tolerance
+        all_chains = add_wrist_chains(arm, route, columns, all_chains, pace.turn, max_offset)
+    starts = _start_chains(arm, all_chains, fixed)
     if branch is not None:
         labels = find_branches(columns.names, branch)
-        starts = [c for c in starts if c.labels[0] in labels]
+        starts = [chain for chain in starts if chain.labels[0] in labels]
     end = len(columns.s) - 1
-    complete = [Run(c, 0, end) for c in starts if c.carries_to(0) == end]
+    complete = [Run(chain, 0, end) for chain in starts if chain.carries_to(0) == end]
     if len(complete) > 1:
         complete = [_fastest_run(arm, route, columns.s, complete, near, pace, fixed)]
-    return CarriedRoute(route, columns, every_chain, complete or fewest_runs(every_chain, end + 1, starts))
+    return CarriedRoute(route, columns, all_chains, complete or fewest_runs(all_chains, end + 1, starts))
 
 
 def _start_chains(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
     """The chains that may begin a route; fixed: (n,) where the arm stands, if it has no choice."""
-    starts = [c for c in chains if c.first == 0]
+    starts = [chain for chain in chains if chain.first == 0]
     if fixed is None:
         return starts
-    # where no branch goes on it stands by itself: a wrist has to turn first, at rest
-    return [c for c in starts if starts_at(c, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
+    # without a branch there the start is a chain of one sample: the wrist has to turn at rest first
+    return [chain for chain in starts if starts_at(chain, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
 
 
 def starts_at(chain: Chain, q: Array) -> bool:
-    """Whether a chain begins in a posture (n,), whole turns apart."""
+    """Whether a chain begins at the posture q (n,), up to whole turns."""
     return float(np.abs(joint_change(chain.arm, chain.q[0], q)).max()) < 1e-4
 
 
 def _fastest_run(
     arm: Arm, route: Route, s: Array, runs: list[Run], near: Array, pace: Pace, fixed: Array | None
 ) -> Run:
-    """The run that is soonest begun, of those that take nearly the least time; of equals the first."""
+    """The run with the shortest approach among those that take nearly the least time."""
     seconds = np.array([_run_time(arm, route, s, run, near, pace) for run in runs])
     return min(
         (run for run, t in zip(runs, seconds, strict=True) if t <= seconds.min() * 1.0005),
@@ -151,13 +153,13 @@ def _fastest_run(
 
 
 def _approach_time(run: Run, near: Array, fixed: Array | None) -> float:
-    """How far the joints are from where the arm comes from, in seconds at least."""
+    """A lower bound [s] of the time from `near` to the first posture of a run."""
     speed = np.where(np.isnan(run.chain.arm.max_speed), 1.0, run.chain.arm.max_speed)
     return float((np.abs(run.chain.joints(0, run.last, near, fixed)[0] - near) / speed).max())
 
 
 def _run_time(arm: Arm, route: Route, s: Array, run: Run, near: Array, pace: Pace) -> float:
-    """Time that a run takes for the whole route, on its own samples."""
+    """The time of a run on a coarse grid [s], or the sum of joint motion where the arm has no rates."""
     if np.isnan(arm.max_speed).any() or np.isnan(arm.max_accel).any():
         return float(np.abs(np.diff(run.chain.q, axis=0)).sum())
     return sum(stretch.duration for stretch in run_stretches(arm, route, s, run, near, pace, grid=300))
@@ -179,26 +181,26 @@ def run_stretches(
     route = add_detours(route, run.chain.windows)
     s = s[run.first : run.last + 1]
     stops = [float(route.ends[k]) for k in sorted(route.stops)]
-    edges = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
-    edges = [a for a, b in pairwise(edges) if b - a > 1e-9] + edges[-1:]
-    allowed = None if grid < _MIN_GRID_POINTS else pace.tolerance - route.largest_detour
-    made: list[Curve | Smoothed] = []
-    for part in _group_rests(edges, s):
-        a, b, inner = part[0], part[-1], np.array(part[1:-1])
-        samples = slice(max(int(np.searchsorted(s, a, side="right")) - 1, 0), int(np.searchsorted(s, b)) + 1)
-        solved = len(s[samples])  # a long way, of many turns for example, needs more points than a short one
-        number = max(int(grid * (b - a) / route.length), solved * grid // (2 * _MIN_GRID_POINTS), 60)
-        way = Way(route, s[samples], q[samples], a, b, run.chain.windows, inner)
-        path, deviations = refine_grid(arm, way, number, allowed)
+    rests = [s[0], *[x for x in stops if s[0] + 1e-9 < x < s[-1] - 1e-9], s[-1]]
+    rests = [begin for begin, end in pairwise(rests) if end - begin > 1e-9] + rests[-1:]
+    tolerance = None if grid < _MIN_GRID_POINTS else pace.tolerance - route.largest_detour
+    stretches: list[Curve | Smoothed] = []
+    for part in _group_rests(rests, s):
+        begin, end, inner = part[0], part[-1], np.array(part[1:-1])
+        samples = slice(max(int(np.searchsorted(s, begin, side="right")) - 1, 0), int(np.searchsorted(s, end)) + 1)
+        solved = len(s[samples])  # a route of many turns has more samples, and needs more points
+        number = max(int(grid * (end - begin) / route.length), solved * grid // (2 * _MIN_GRID_POINTS), 60)
+        way = Way(route, s[samples], q[samples], begin, end, run.chain.windows, inner)
+        path, deviations = refine_grid(arm, way, number, tolerance)
         _check_deviation(path, deviations + route.largest_detour, pace)
-        if made:  # the stop is the same to the last digit
-            path.q[0] = made[-1].end
-        made += _time_path(arm, route, refine_knots(path), pace)
-    return made
+        if stretches:  # consecutive stretches share the posture at rest exactly
+            path.q[0] = stretches[-1].end
+        stretches += _time_path(arm, route, refine_knots(path), pace)
+    return stretches
 
 
 def _group_rests(edges: list[float], s: Array) -> list[list[float]]:
-    """Places of rest, from one to the next; where there are many, some together: between them all is independent."""
+    """Groups of rests to plan together: each pair of neighbours or, where there are many, longer groups of them."""
     if len(edges) <= _MANY_RESTS:
         return [list(pair) for pair in pairwise(edges)]
     first = np.flatnonzero(np.diff(np.searchsorted(s, edges[:-1]) // _CHUNK_SAMPLES, prepend=-1)).tolist()
@@ -206,30 +208,30 @@ def _group_rests(edges: list[float], s: Array) -> list[list[float]]:
 
 
 def _check_deviation(path: Knots, deviation: Array, pace: Pace) -> None:
-    """Raise NoSolutionError where a grid's cubics may leave the path."""
-    k = int(deviation.argmax())
-    if deviation[k] > pace.tolerance:
+    """Raise NoSolutionError if the cubics of a grid may leave the path by more than the tolerance."""
+    i = int(deviation.argmax())
+    if deviation[i] > pace.tolerance:
         raise NoSolutionError(
-            f"between {path.s[k]:.3f} and {path.s[k + 1]:.3f} mm the plan may leave the path by {deviation[k]:.3g} mm; "
+            f"between {path.s[i]:.3f} and {path.s[i + 1]:.3f} mm the plan may leave the path by {deviation[i]:.3g} mm; "
             f"{pace.tolerance:g} are allowed: nothing was moved"
         )
 
 
 def _time_path(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoothed]:
-    """The fastest law of time on a grid, from each rest to the next."""
+    """The time-optimal curves on a grid, one from each rest to the next."""
     cap, fraction = _speed_caps(arm, route, path, pace)
     accel = arm.max_accel * pace.accel
-    mean = 0.0
+    window = 0.0
     if pace.jerk is not None:
-        mean = smoothing_window(accel, pace.jerk)
-        cap = np.minimum(cap, _smoothing_cap(arm, path, mean, pace.tolerance))
+        window = smoothing_window(accel, pace.jerk)
+        cap = np.minimum(cap, _smoothing_cap(arm, path, window, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
     x = optimal_law(path, Bounds(speed, accel, cap), coupled_motors(arm, pace.accel))
-    made: list[Curve | Smoothed] = []
+    curves: list[Curve | Smoothed] = []
     for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
         curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
-        made.append(Smoothed(curve, mean) if mean else curve)
-    return made
+        curves.append(Smoothed(curve, window) if window else curve)
+    return curves
 
 
 def _speed_caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:
@@ -239,20 +241,20 @@ def _speed_caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array,
     with np.errstate(over="ignore"):
         tool_cap = (tool / np.maximum(tip, 1e-300)) ** 2
     tool_cap = np.where(np.isfinite(tool), tool_cap, np.inf)
-    cap, least = (np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (tool_cap, fraction))
+    cap, min_fraction = (np.minimum(np.append(x, np.inf), np.append(np.inf, x)) for x in (tool_cap, fraction))
     if pace.hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = np.minimum(cap, hold_cap(arm, path, pace.hold))
-    return cap, least
+    return cap, min_fraction
 
 
 def coupled_motors(arm: Arm, share: float) -> tuple[Array, Array] | None:
-    """Motors that turn several joints: their weights and greatest accelerations, in counts; None: there is none."""
+    """The gains and greatest accelerations [counts] of motors that drive several joints; None: there are none."""
     shared = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
     return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None
 
 
 def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:
-    """x at which the moving average shifts the tip by half the tolerance: (N,).
+    """The (ds/dt)^2 at which the moving average shifts the tip by half the tolerance: (N,).
 
     The average over T, `mean`, shifts q by T^2/24 (q'' x + q' u); the second part is along the path.
     """
@@ -264,7 +266,7 @@ def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Arra
 
 
 def _drop_close_values(s: Array, least: float) -> Array:
-    """Sorted values without those that are closer than `least` to the one before; the last one stays."""
+    """Sorted values without those less than `least` behind their predecessor; the last value is kept."""
     keep = np.concatenate([[True], np.diff(s) > least])
     separated = s[keep]
     separated[-1] = s[-1]

@@ -2,8 +2,8 @@
 
 On a straight step D in joint space the tip leaves its chord by at most 1/8 sum_jk |D_j| |D_k| r(j, k): the second
 derivatives of the forward kinematics are levers, at most r, the reach beyond the later of the two joints. Two
-solutions of neighbouring samples are one branch if that is within the tolerance. Steps where a branch finds no
-such partner are divided, until it does or they are too short to mean anything: there it ends.
+solutions of neighbouring samples are one branch if this bound is within the tolerance. A step on which a branch finds
+no partner is divided until it finds one or the step is too short, and then the branch ends there.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from armkin.motion.branches.joint_steps import chord_bound, joint_change, larges
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MIN_STEP = 1e-9  # step, as a share of the route, below which what is not linked is a jump
-END_ACCURACY = 0.002  # accuracy [mm] with which the end of a branch, or the crossing of a limit, is found
-_TORN_PARTS = 3  # parts of a step in which branches end: where they are more, branches end everywhere
-_PART_COUNTS = (8, 32)  # parts of a step that is divided: with many such steps, and with few
-_CHUNK_SAMPLES = 1024  # samples solved at once, if the parts are no fewer
-_MAX_SAMPLES = 50_000  # samples added at most
-_BLOCK_STEPS = 16_384  # steps looked at together
+MIN_STEP = 1e-9  # shortest step, as a share of the route: branches not linked on it are separate
+END_ACCURACY = 0.002  # accuracy [mm] of the place where a branch ends or a joint crosses a limit
+_TORN_PARTS = 3  # a step with branch ends in more parts than this is not divided further
+_PART_COUNTS = (8, 32)  # least and greatest number of parts of a divided step
+_CHUNK_SAMPLES = 1024  # samples that a round of divisions aims at
+_MAX_SAMPLES = 50_000  # most samples added by divisions
+_BLOCK_STEPS = 16_384  # steps certified in one call
 
 
 def link_branches(
     arm: Arm, targets: Callable[[Array], Array], s: Array, *, task: str | None, tolerance: float, near: Array
 ) -> Columns:
-    """All branches at samples s of a route, every step certified or divided as far as it makes sense.
+    """All branches at samples s of a route, with every step certified or divided down to the shortest length.
 
     targets: lengths (N,) to targets; near: joint values for joints that are free.
     """
@@ -44,7 +44,7 @@ def link_branches(
 
 
 class _Linking:
-    """The samples so far, and which steps are still open."""
+    """The columns so far, and which steps between their samples have to be linked or divided."""
 
     def __init__(
         self,
@@ -61,8 +61,8 @@ class _Linking:
         self.turn = whole_turns(arm)
         self.scale, self.top = largest_form(arm, self.lever)
         self.added = 0
-        self.fresh = np.zeros(0, bool)  # samples that were added
-        self.wide = [  # joints whose copies overlap: a run may end at a limit though another copy is legal
+        self.fresh = np.zeros(0, bool)  # whether a sample was added by a division
+        self.wide = [  # joints with a range over a whole turn: two copies may be legal at once
             j
             for j in range(arm.n)
             if not arm.prismatic[j]
@@ -75,15 +75,15 @@ class _Linking:
         self.columns = self.samples.solve_first(s)
         N, B = len(s), self.columns.q.shape[1]
         self.columns.partner = np.full((N - 1, B), -1, np.int16)
-        self.open = np.ones(N - 1, bool)  # steps to look at
+        self.open = np.ones(N - 1, bool)  # steps to be linked
         self.torn = np.zeros(N - 1, bool)  # steps with a branch that has no partner
-        self.both = np.zeros(N - 1, bool)  # steps with one at either end, which may be the same branch
+        self.both = np.zeros(N - 1, bool)  # steps with an unlinked branch at either end, maybe the same
         self.crossing = np.zeros(N - 1, bool)  # steps in which a joint passes a limit
         self._link()
 
     def settle(self) -> None:
-        """Divide the steps that need it, apart from all the others, three samples around each."""
-        c = self.columns
+        """Divide the unlinked steps in a small table of their own, with three samples around each."""
+        columns = self.columns
         steps = np.flatnonzero(self.torn | self.crossing)
         if not len(steps):
             return
@@ -91,8 +91,8 @@ class _Linking:
         samples = self.samples
         part = _Linking(samples.arm, samples.targets, samples.task, self.tolerance, samples.near, self.length)
         part.samples = samples
-        part.columns = c.take_rows(rows)
-        part.columns.partner = c.partner[rows[:-1]]
+        part.columns = columns.take_rows(rows)
+        part.columns.partner = columns.partner[rows[:-1]]
         part.columns.partner[2::3] = -1  # the samples between the groups have no partner
         part.open = np.zeros(len(rows) - 1, bool)
         part.torn, part.both, part.crossing = part.open.copy(), part.open.copy(), part.open.copy()
@@ -105,57 +105,57 @@ class _Linking:
         self._take_over(part, steps, group)
 
     def _take_over(self, part: _Linking, steps: Int, group: Int) -> None:
-        """Take over what was added to the steps, and their links."""
+        """Insert the samples that divisions have added, with their links."""
         B = max(self.columns.q.shape[1], part.columns.q.shape[1])
-        c, p, fresh = self.columns.pad_to(B), part.columns.pad_to(B), part.fresh
-        positions = np.repeat(steps + 1, np.bincount(group[fresh], minlength=len(steps)))
-        links = np.append(p.partner, np.full((1, B), -1, np.int16), axis=0)
+        columns, part_columns, is_new = self.columns.pad_to(B), part.columns.pad_to(B), part.fresh
+        positions = np.repeat(steps + 1, np.bincount(group[is_new], minlength=len(steps)))
+        links = np.append(part_columns.partner, np.full((1, B), -1, np.int16), axis=0)
         # the left end of each step is the second sample of its group
-        second = np.flatnonzero(~fresh)[1::3]
-        c.partner = c.partner.copy()
-        c.partner[steps] = links[second]
-        added = p.take_rows(np.flatnonzero(fresh))
-        added.partner = links[fresh]
-        self.columns = c.insert_rows(positions, added)
+        left_ends = np.flatnonzero(~is_new)[1::3]
+        columns.partner = columns.partner.copy()
+        columns.partner[steps] = links[left_ends]
+        added = part_columns.take_rows(np.flatnonzero(is_new))
+        added.partner = links[is_new]
+        self.columns = columns.insert_rows(positions, added)
 
     def divide(self) -> bool:
-        """Divide what has no partner yet, or holds an end that is not known finely enough; False: all is done.
+        """Divide the steps with unlinked branches or limit crossings once; False: none is left to divide.
 
-        A branch without a partner of which the step's other end knows nothing ends in that step, whatever is found
-        inside: where it does is all that is asked.
+        A branch that has no counterpart at the step's other end must end within the step. Only the place of that end
+        is wanted, to END_ACCURACY.
         """
-        c = self.columns
-        h = np.diff(c.s)
-        least = np.where(self.both, max(MIN_STEP * self.length, 1e-9), END_ACCURACY)
-        steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * least))
-        # Ends need no more than the formulas; their samples on edges are dear to examine.
-        singular = c.status == Status.SINGULAR
-        plain = ~(self.both | singular[:-1] | singular[1:])[steps]
-        quick = bool(plain.any())
-        steps = steps[plain] if quick else steps
+        columns = self.columns
+        h = np.diff(columns.s)
+        min_step = np.where(self.both, max(MIN_STEP * self.length, 1e-9), END_ACCURACY)
+        steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * min_step))
+        # Steps that only hold an end go first, by the formulas alone: singular samples are expensive to examine.
+        singular = columns.status == Status.SINGULAR
+        is_plain = ~(self.both | singular[:-1] | singular[1:])[steps]
+        skip_singular = bool(is_plain.any())
+        steps = steps[is_plain] if skip_singular else steps
         if not len(steps) or self.added > _MAX_SAMPLES:
             return False
         parts = int(np.clip(_CHUNK_SAMPLES // len(steps), *_PART_COUNTS))
-        f = np.arange(1, parts) / parts
-        lengths = (c.s[steps, None] + h[steps, None] * f).ravel()
-        columns = self.samples.solve_at(lengths, examine=not quick)
+        fractions = np.arange(1, parts) / parts
+        lengths = (columns.s[steps, None] + h[steps, None] * fractions).ravel()
+        added_columns = self.samples.solve_at(lengths, examine=not skip_singular)
         self.where = rows = np.repeat(steps + 1, parts - 1)
         self.fresh = np.insert(self.fresh, rows, True)
         self.added += len(lengths)
-        self.columns = c.insert_rows(rows, columns)
-        fresh = np.zeros(len(c.s) - 1, bool)
-        fresh[steps] = True
-        self.open = np.insert(fresh, rows, True)
-        self.torn = np.insert(self.torn & ~fresh, rows, False)
-        self.both = np.insert(self.both & ~fresh, rows, False)
-        self.crossing = np.insert(self.crossing & ~fresh, rows, False)
-        begins = np.flatnonzero(fresh) + (parts - 1) * np.arange(len(steps))  # begins of the divided steps
+        self.columns = columns.insert_rows(rows, added_columns)
+        divided = np.zeros(len(columns.s) - 1, bool)
+        divided[steps] = True
+        self.open = np.insert(divided, rows, True)
+        self.torn = np.insert(self.torn & ~divided, rows, False)
+        self.both = np.insert(self.both & ~divided, rows, False)
+        self.crossing = np.insert(self.crossing & ~divided, rows, False)
+        first_parts = np.flatnonzero(divided) + (parts - 1) * np.arange(len(steps))  # first part of each divided step
         self._link()
-        self._give_up(begins[:, None] + np.arange(parts))
+        self._give_up(first_parts[:, None] + np.arange(parts))
         return True
 
     def _give_up(self, steps: Int) -> None:
-        """Leave what no dividing links: steps (M, parts) of singular postures, whose free joints stand anywhere."""
+        """Stop dividing steps (M, parts) between singular postures: their free joints have no continuous values."""
         singular = self.columns.status == Status.SINGULAR
         inside = (singular[:-1] & singular[1:])[steps]
         mostly_torn = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN_PARTS
@@ -169,79 +169,79 @@ class _Linking:
         self.open[:] = False
 
     def _link_rows(self, rows: Int, valid: Bool) -> None:
-        c, first, behind = self.columns, int(rows[0]), int(rows[-1]) + 1
-        every = behind - first == len(rows)
-        left, right = (slice(first, behind), slice(first + 1, behind + 1)) if every else (rows, rows + 1)
-        good, wrapped = self._certify(c.q[left], c.q[right], valid[left] & valid[right])
-        column = np.arange(c.q.shape[1], dtype=np.int16)
-        c.partner[rows] = np.where(good, column, np.int16(-1))
-        straight = (good == (valid[left] | valid[right])).all(axis=1)
+        columns, first, end = self.columns, int(rows[0]), int(rows[-1]) + 1
+        contiguous = end - first == len(rows)
+        left, right = (slice(first, end), slice(first + 1, end + 1)) if contiguous else (rows, rows + 1)
+        certified, wrapped = self._certify(columns.q[left], columns.q[right], valid[left] & valid[right])
+        column = np.arange(columns.q.shape[1], dtype=np.int16)
+        columns.partner[rows] = np.where(certified, column, np.int16(-1))
+        straight = (certified == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows], self.both[rows] = False, False
-        flips = (c.within_limits[left] != c.within_limits[right]) & good
+        flips = (columns.within_limits[left] != columns.within_limits[right]) & certified
         if self.wide:
-            flips |= self._crossed_limits(c.q, left, right, wrapped) & good
+            flips |= self._crossed_limits(columns.q, left, right, wrapped) & certified
         self.crossing[rows] = flips.any(axis=1)
         for i in rows[~straight]:
             self._match_step(int(i), valid)
 
     def _certify(self, a: Array, b: Array, present: Bool) -> tuple[Bool, Bool]:
-        """Which branches (M, B, n) at steps' ends are one, by a cheap bound and where that is too coarse by the bound.
+        """Which branches (M, B, n) at the ends of steps are the same: by a cheap bound, then by the exact one.
 
-        present: (M, B). Returns that, and which of the cheaply refused ones go the other way round: (M, B) each.
+        present: (M, B). Returns (M, B) whether certified, and whether the step wraps round by a whole turn.
         """
         D = b - a
         if self.scale is not None:
             D *= self.scale
         with np.errstate(invalid="ignore"):
-            good = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
-        k, j = np.nonzero(present & ~good)
-        wrapped = np.zeros(good.shape, bool)
-        if len(k):
-            shorter = joint_change(self.arm, a[k, j], b[k, j])
-            good[k, j] = chord_bound(self.lever, shorter) <= self.tolerance
-            wrapped[k, j] = np.abs(b[k, j] - a[k, j] - shorter).max(axis=1) > 1.0
-        return good, wrapped
+            certified = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
+        step, column = np.nonzero(present & ~certified)
+        wrapped = np.zeros(certified.shape, bool)
+        if len(step):
+            shorter = joint_change(self.arm, a[step, column], b[step, column])
+            certified[step, column] = chord_bound(self.lever, shorter) <= self.tolerance
+            wrapped[step, column] = np.abs(b[step, column] - a[step, column] - shorter).max(axis=1) > 1.0
+        return certified, wrapped
 
     def _match_step(self, i: int, valid: Bool) -> None:
-        """Partners of one step, whatever their columns: certified pairs, the smoothest first."""
-        c, arm = self.columns, self.arm
+        """Pair the branches of step i across columns: certified pairs, the smoothest first."""
+        columns, arm = self.columns, self.arm
         left, right = np.flatnonzero(valid[i]), np.flatnonzero(valid[i + 1])
-        D = joint_change(arm, c.q[i, left][:, None], c.q[i + 1, right][None])
+        D = joint_change(arm, columns.q[i, left][:, None], columns.q[i + 1, right][None])
         certified = chord_bound(self.lever, D) <= self.tolerance
         guess = np.zeros((len(left), arm.n))
-        if i > 0 and c.s[i] > c.s[i - 1]:
-            ratio = (c.s[i + 1] - c.s[i]) / (c.s[i] - c.s[i - 1])
-            for k, b in enumerate(left):
-                before = np.flatnonzero(c.partner[i - 1] == b)
-                if len(before):
-                    guess[k] = joint_change(arm, c.q[i - 1, before[0]], c.q[i, b]) * min(ratio, 10.0)
+        if i > 0 and columns.s[i] > columns.s[i - 1]:
+            ratio = (columns.s[i + 1] - columns.s[i]) / (columns.s[i] - columns.s[i - 1])
+            for row, b in enumerate(left):
+                previous = np.flatnonzero(columns.partner[i - 1] == b)
+                if len(previous):
+                    guess[row] = joint_change(arm, columns.q[i - 1, previous[0]], columns.q[i, b]) * min(ratio, 10.0)
         cost = np.where(certified, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
-        c.partner[i] = -1
+        columns.partner[i] = -1
         while np.isfinite(cost).any():
             a, b = np.unravel_index(int(cost.argmin()), cost.shape)
-            c.partner[i, left[a]] = right[b]
+            columns.partner[i, left[a]] = right[b]
             cost[a, :], cost[:, b] = np.inf, np.inf
-        # A branch without a copy within limits at either end carries nothing: where it goes on is not asked.
-        alone, arriving = left[c.partner[i, left] < 0], np.setdiff1d(right, c.partner[i])
-        self.torn[i] = c.within_limits[i, alone].any() or c.within_limits[i + 1, arriving].any()
-        self.both[i] = self.torn[i] and len(alone) and len(arriving)
+        # A branch that is outside the limits at this end carries nothing, so its partner does not matter.
+        unpaired, new_branches = left[columns.partner[i, left] < 0], np.setdiff1d(right, columns.partner[i])
+        self.torn[i] = columns.within_limits[i, unpaired].any() or columns.within_limits[i + 1, new_branches].any()
+        self.both[i] = self.torn[i] and len(unpaired) and len(new_branches)
 
     def _crossed_limits(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
-        """Which columns of steps have a wide joint that passes one of its limits, whole turns apart: (M, B)."""
+        """Whether a wide joint passes one of its limits (or a copy of it) on a step, for each column: (M, B)."""
         crossed = wrapped.copy()
-        for j in self.wide:
-            value = q[:, :, j]
-            for limit in (self.arm.lower[j], self.arm.upper[j]):
-                crossed |= np.floor((value[starts] - limit) / self.turn[j]) != np.floor(
-                    (value[ends] - limit) / self.turn[j]
+        for joint in self.wide:
+            value = q[:, :, joint]
+            for limit in (self.arm.lower[joint], self.arm.upper[joint]):
+                crossed |= np.floor((value[starts] - limit) / self.turn[joint]) != np.floor(
+                    (value[ends] - limit) / self.turn[joint]
                 )
-        k, b = np.nonzero(wrapped)  # joints that go the other way round
-        if len(k):
-            start, end = q[starts][k, b], q[ends][k, b]
+        step, column = np.nonzero(wrapped)  # steps on which a joint wraps round by a whole turn
+        if len(step):
+            start, end = q[starts][step, column], q[ends][step, column]
             unwrapped_end = start + joint_change(self.arm, start, end)
-            crossed[k, b] = False
-            for j in self.wide:
-                for limit in (self.arm.lower[j], self.arm.upper[j]):
-                    before, after = (np.floor((x[:, j] - limit) / self.turn[j]) for x in (start, unwrapped_end))
-                    crossed[k, b] |= before != after
+            crossed[step, column] = False
+            for joint in self.wide:
+                for limit in (self.arm.lower[joint], self.arm.upper[joint]):
+                    before, after = (np.floor((x[:, joint] - limit) / self.turn[joint]) for x in (start, unwrapped_end))
+                    crossed[step, column] |= before != after
         return crossed

@@ -17,22 +17,22 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
-DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad] at first, and where that swings joints round beside a singularity
-_BLOCK_POINTS = 8192  # points looked at together
-_SETTLED_LENGTH = 1e-8  # relative length of a Newton step after which the next one would be nothing
-_SHORT_STEP, _STEP_RATIO = 1e-5, 1e-3  # relative length of a step, and ratio to the one before, that end the method
-_SLOPE_DISTANCE = 1e-6  # distance [mm] along the route to the target that tells a slope
-_SLOPE_DAMPING = 0.02  # damping [mm/rad] of slopes: rounding is multiplied little
-_DAMPED_SHARE = 1e-5  # share of a slope that damping takes: where it is more a singularity is near
+DAMPING = (2e-4, 0.02, 0.5)  # dampings [mm/rad]: the first one, and larger ones for motions near a singularity
+_BLOCK_POINTS = 8192  # points solved in one call
+_SETTLED_LENGTH = 1e-8  # relative length of a Newton step that ends the iteration
+_SHORT_STEP, _STEP_RATIO = 1e-5, 1e-3  # a step this short and this much shorter than the last one ends it, too
+_SLOPE_DISTANCE = 1e-6  # distance [mm] along the route of the difference quotient for a slope
+_SLOPE_DAMPING = 0.02  # damping [mm/rad] of slopes, which keeps rounding errors small
+_DAMPED_SHARE = 1e-5  # a slope that damping changes by a larger share is near a singularity
 
 
 def correct_to_route(
     arm: Arm, task: Task, q: Array, target: Array, damping: float = DAMPING[0], steps: int = 6
 ) -> Array:
-    """Joint values near the right ones, made exact by damped Newton steps; those of free joints stay: (N, n).
+    """Correct approximate joint values q by damped Newton steps; free joints keep their values: (N, n).
 
-    damping: [mm/rad] a miss of e is worth at most e / (2 damping): beside a singularity the joints need not swing
-    round for what is within the tolerance anyway.
+    damping: [mm/rad] a miss of e moves a joint by at most e / (2 damping), so that joints near a singularity do not
+    swing round to correct a miss within the tolerance.
     """
     blocks = [slice(i, i + _BLOCK_POINTS) for i in range(0, len(q), _BLOCK_POINTS)]
     return np.concatenate([_newton(arm, task, q[part], target[part], damping, steps) for part in blocks])
@@ -40,25 +40,25 @@ def correct_to_route(
 
 def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
     unit = radian_or_reach(arm)
-    solved, open_, before = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
+    solved, active, last_size = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
     for _ in range(steps):
-        q = solved[open_]
+        q = solved[active]
         T, J = _pose_and_jacobian(arm, task, q)
-        r = _residuals(arm, task, T, q, target[open_])
+        r = _residuals(arm, task, T, q, target[active])
         step = _damped_steps(J, r, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
-        solved[open_] = q + step.T * unit
-        # where a step is so much shorter than the one before, the next one would be nothing
-        going = (size >= _SETTLED_LENGTH) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * before))
-        open_, before = open_[going], size[going]
-        if not len(open_):
+        solved[active] = q + step.T * unit
+        # after a step much shorter than the last one the next step would be negligible
+        continues = (size >= _SETTLED_LENGTH) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * last_size))
+        active, last_size = active[continues], size[continues]
+        if not len(active):
             break
     return solved
 
 
 def _row_scale(arm: Arm, task: Task) -> Array:
-    """What a unit of each of the task's rows counts: (k,)."""
+    """The weight of each of the task's rows, lengths in shares of the reach: (k,)."""
     scale = np.ones(task.position + len(task.sums) + (3 if task.orientation != "none" else 0))
     scale[: task.position] = 1 / arm.reach
     return scale
@@ -74,7 +74,7 @@ def _pose_and_jacobian(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
 
 
 def _residuals(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array:
-    """What is missing to the targets, without units: (k, M)."""
+    """The differences to the targets, without units: (k, M)."""
     return np.multiply(residual(task, T, q * arm.ratio, target).T, _row_scale(arm, task)[:, None], order="C")
 
 
@@ -106,19 +106,19 @@ def _damped_steps(J: Array, r: Array, damping: float) -> Array:
 def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, coarser: Knots | None) -> Knots | None:
     """Cubics through joint values q (N, n) that solve the route at lengths `points` (N,), with its own slopes.
 
-    rests: numbers of the points at which the path rests: these stand twice. coarser: such cubics on some of the points.
-    None: beside a singularity the joints need not follow all that the targets do.
+    rests: the points at which the path rests, which become two knots each. coarser: cubics on a subset of the points.
+    None: near a singularity the damped joints do not follow every target exactly.
     """
-    twice = np.sort(np.concatenate([np.arange(len(points)), rests]))
-    s, values = points[twice], np.asfortranarray(q[twice])
+    point_numbers = np.sort(np.concatenate([np.arange(len(points)), rests]))
+    s, values = points[point_numbers], np.asfortranarray(q[point_numbers])
     d, unsolved = np.empty_like(values), np.ones(len(s), bool)
     if coarser is not None:
         positions = np.searchsorted(s, coarser.s)
         positions += np.diff(coarser.s, prepend=-1.0) == 0
         d[positions], unsolved[positions] = coarser.d, False
-    ends = np.append(twice[1:] == twice[:-1], True)  # the slope there is that of the way before it
-    number = np.flatnonzero(unsolved)
-    for part in (number[i : i + _BLOCK_POINTS] for i in range(0, len(number), _BLOCK_POINTS)):
+    ends = np.append(point_numbers[1:] == point_numbers[:-1], True)  # the end takes the slope of its left side
+    rows = np.flatnonzero(unsolved)
+    for part in (rows[i : i + _BLOCK_POINTS] for i in range(0, len(rows), _BLOCK_POINTS)):
         slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_SLOPE_DISTANCE, _SLOPE_DISTANCE))
         if slopes is None:
             return None
@@ -131,9 +131,9 @@ def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> 
     if arm.n > len(_row_scale(arm, route.task)):
         return None
     T, J = _pose_and_jacobian(arm, route.task, q)
-    aside = s + detour_slope
-    misses, misses_aside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, aside))
-    rate = (misses_aside - misses) / (aside - s)
+    s_beside = s + detour_slope
+    misses, misses_aside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, s_beside))
+    rate = (misses_aside - misses) / (s_beside - s)
     d = _damped_steps(J, rate, (_SLOPE_DAMPING / arm.reach) ** 2)
     unexplained = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
     if not (unexplained <= _DAMPED_SHARE * np.abs(rate).max(axis=0)).all():

@@ -1,9 +1,9 @@
-"""Straight through a wrist singularity or beside one, the tool turned a little or the tip a little aside.
+"""Passes wrist singularities: the tool turns aside a little, or the tip makes a detour within the tolerance.
 
-Beside a singularity of the wrist joint 4 has to swing round within a distance as short as the path's own from it.
-Over a window about that place the last three joints are cubics instead, from the posture before it to the one behind
-it in which the wrist is flipped, and the first three hold the tip on the path. Where the tool may not be turned and
-the singularity lies within the tolerance, the tip goes there: straight through it joint 4 need not swing at all.
+Near a wrist singularity joint 4 has to swing round over a distance as short as that between path and singularity.
+Instead, the wrist joints follow cubics over a window, from the posture before it to the flipped one behind it, while
+the first three joints hold the tip on the path. If the tool may not turn but the singularity is within the tolerance,
+the tip makes a detour exactly through it, where joint 4 need not swing at all.
 """
 
 from __future__ import annotations
@@ -29,18 +29,18 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.tool_path.route import Route
 
-ASIDE_SHARE = 0.5  # share of the tolerance by which the tip may go aside
-_NEAR_DISTANCE = 2.0  # distance [tolerances] from straight beyond which a wrist is not looked at
-_ARM_MOVEMENT = 0.1  # movement [rad] of the first three joints between two postures that are a flip of the wrist apart
-_HALF_WIDTH, _WIDTH_FACTOR, _WIDTH_COUNT = 0.25, 1.5, 14  # windows: least half [mm], factor, number
-_WINDOW_GAP = 0.1  # distance [mm] between the end of one window and the begin of the next
-_SLOPE_STEP = 0.01  # distance [mm] to either side at which slopes are taken
-_PLACE_COUNT = 97  # places in a window at which the tool's rotation is looked at
-_MAX_SINGULARITIES = 16  # singularities, at most, on the way
-_EXACT_ERROR = 1e-6  # error [mm and rad] below which a posture meets its target
-_ROUNDING_SHARE = 1e-12  # share of the wrist's volume that is rounding
-_VOLUME_SHARE = 1e-4  # share of the wrist's volume below which it does not tell joint 4
-_MIN_WEIGHT = 1e-8  # weight [1/mm] of a millimetre beside a radian where the tool's direction must be kept
+ASIDE_SHARE = 0.5  # share of the tolerance that a detour of the tip may take
+_NEAR_DISTANCE = 2.0  # distance [tolerances] from straight up to which a window is tried
+_ARM_MOVEMENT = 0.1  # most movement [rad] of the first three joints in a wrist flip
+_HALF_WIDTH, _WIDTH_FACTOR, _WIDTH_COUNT = 0.25, 1.5, 14  # windows: smallest half width [mm], growth factor, count
+_WINDOW_GAP = 0.1  # largest gap [mm] between the chains before and behind a singularity
+_SLOPE_STEP = 0.01  # distance [mm] of the difference quotients for slopes
+_PLACE_COUNT = 97  # places in a window at which the tool is checked
+_MAX_SINGULARITIES = 16  # most singularities that one chain passes
+_EXACT_ERROR = 1e-6  # greatest error [mm and rad] of a posture that meets its target
+_ROUNDING_SHARE = 1e-12  # wrist volume below which it is rounding error
+_VOLUME_SHARE = 1e-4  # wrist volume below which joint 4 is undetermined
+_MIN_WEIGHT = 1e-8  # weight [1/mm] of position beside direction, which comes first
 _NEWTON_STEPS = 8  # steps of Newton's method to a straight wrist
 
 
@@ -61,20 +61,20 @@ def check_wrist(arm: Arm) -> None:
 def add_wrist_chains(
     arm: Arm, route: Route, columns: Columns, chains: list[Chain], turn: float, tip_offset: float
 ) -> list[Chain]:
-    """Chains, and those that go on with the wrist flipped behind a singularity.
+    """The chains, and those that pass a singularity and go on with the wrist flipped.
 
-    turn: [rad] by which the tool may be turned for it, tip_offset: [mm] that the tip may go.
+    turn: [rad] by which the tool may turn aside; tip_offset: [mm] length of a detour, at most.
     """
     s, all_chains, latest = columns.s, list(chains), list(chains)
-    near = _NEAR_DISTANCE * max(np.sin(turn), tip_offset / MIN_LEVER)
+    max_volume = _NEAR_DISTANCE * max(np.sin(turn), tip_offset / MIN_LEVER)
     for _ in range(_MAX_SINGULARITIES):
         joined_chains = []
-        for c in latest:
-            for j in _straight_samples(arm, c, near):
-                if c.windows and s[j] <= c.windows[-1].end:
+        for chain in latest:
+            for sample in _straight_samples(arm, chain, max_volume):
+                if chain.windows and s[sample] <= chain.windows[-1].end:
                     continue
                 for next_chain in chains:
-                    joined = _chain_through_window(arm, route, s, c, next_chain, j, (turn, tip_offset))
+                    joined = _chain_through_window(arm, route, s, chain, next_chain, sample, (turn, tip_offset))
                     joined_chains += [] if joined is None else [joined]
         all_chains, latest = all_chains + joined_chains, joined_chains
         if not joined_chains or len(all_chains) > _MAX_SINGULARITIES * len(chains):
@@ -85,39 +85,40 @@ def add_wrist_chains(
 @lru_cache(maxsize=256)
 def _volumes_at_three(arm: Arm) -> tuple[float, float, float]:
     """Volumes [1] that the wrist's axes span where joint 5 has turned by 0, 90 and 180 degrees."""
-    tried = np.tile(arm.home, (3, 1))
-    tried[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
-    axes = jacobian(arm, tried)[:, 3:, 3:]
+    postures = np.tile(arm.home, (3, 1))
+    postures[:, 4] = np.array([0.0, 0.5, 1.0]) * np.pi / arm.ratio[4]
+    axes = jacobian(arm, postures)[:, 3:, 3:]
     a, b, c = np.linalg.det(axes / np.linalg.norm(axes, axis=1, keepdims=True)).tolist()
     return a, b, c
 
 
 def _wrist_volume(arm: Arm, q: Array) -> Array:
-    """The volume of the wrist's axes at joint values (N, n): 0 where it is straight; joint 5 alone tells: (N,)."""
+    """The volume of the wrist's axes at joint values (N, n), by joint 5 alone; 0 for a straight wrist: (N,)."""
     a, b, c = _volumes_at_three(arm)
     angle = q[:, 4] * arm.ratio[4]
     return np.asarray((a + c) / 2 + (a - c) / 2 * np.cos(angle) + (b - (a + c) / 2) * np.sin(angle))
 
 
-def _straight_samples(arm: Arm, c: Chain, near: float) -> list[int]:
-    """Samples at which a chain's wrist comes nearest to straight, and near enough."""
-    volumes = np.abs(_wrist_volume(arm, c.q))
-    volumes[volumes < _ROUNDING_SHARE] = 0.0  # else every other sample of an all singular way were a least one
+def _straight_samples(arm: Arm, chain: Chain, max_volume: float) -> list[int]:
+    """Samples at which the wrist volume of a chain has a local minimum below `max_volume`."""
+    volumes = np.abs(_wrist_volume(arm, chain.q))
+    volumes[volumes < _ROUNDING_SHARE] = 0.0  # else rounding makes minima all along a singular route
     step = np.diff(volumes)
-    least = np.append(True, step <= 0) & np.append(step > 0, True)
-    between = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))  # it may be nearer by so much
-    return (c.first + np.flatnonzero(least & (volumes - between < near))).tolist()
+    is_minimum = np.append(True, step <= 0) & np.append(step > 0, True)
+    # possible decrease between samples
+    decrease = np.maximum(np.append(0.0, np.abs(step)), np.append(np.abs(step), 0.0))
+    return (chain.first + np.flatnonzero(is_minimum & (volumes - decrease < max_volume))).tolist()
 
 
-def _window_spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
-    """First and last samples of windows about sample j, wider and wider, on one piece of the route."""
-    k = int(np.searchsorted(route.breaks, s[j]))
-    low, high = route.breaks[max(k - 1, 0)], route.breaks[min(k, len(route.breaks) - 1)]
-    low = max(low, s[c.first], c.windows[-1].end if c.windows else 0.0)
+def _window_spans(route: Route, s: Array, chain: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
+    """First and last samples of ever wider windows around sample j, within one piece of the route."""
+    piece = int(np.searchsorted(route.breaks, s[j]))
+    low, high = route.breaks[max(piece - 1, 0)], route.breaks[min(piece, len(route.breaks) - 1)]
+    low = max(low, s[chain.first], chain.windows[-1].end if chain.windows else 0.0)
     high = min(high, s[next_chain.last])
     for half in _HALF_WIDTH * _WIDTH_FACTOR ** np.arange(_WIDTH_COUNT):
         a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
-        if a < c.first or b > min(next_chain.last, len(s) - 1) or s[a] < low or s[b] > high:
+        if a < chain.first or b > min(next_chain.last, len(s) - 1) or s[a] < low or s[b] > high:
             return
         if b >= next_chain.first:
             yield a, b
@@ -126,49 +127,49 @@ def _window_spans(route: Route, s: Array, c: Chain, next_chain: Chain, j: int) -
 def _widest_window(
     arm: Arm, route: Route, window: Callable[[int], Window], numbers: range, allowed: tuple[float, float]
 ) -> tuple[int, Window] | None:
-    """The widest window that turns the tool by little enough, else one about which the tip goes, and its number.
+    """The widest window in which the tool turns little enough, else one with a detour of the tip, and its number.
 
-    window: by its number, the higher the wider; allowed: how far the tool may turn [rad], and its tip go aside [mm].
+    window: gives a window by its number, the higher the wider; allowed: turn of the tool [rad], detour of the tip [mm].
     """
-    turn, aside = allowed
-    if turn and (turning := [k for k in numbers if window(k).turned <= turn]):
-        return turning[-1], window(turning[-1])
-    for k in reversed(numbers) if aside else ():
-        around = _window_with_offset(arm, route, window(k))
-        if around is None or around.tip_offset > aside:  # a narrower window has it as well
+    turn, max_offset = allowed
+    if turn and (allowed_numbers := [k for k in numbers if window(k).turned <= turn]):
+        return allowed_numbers[-1], window(allowed_numbers[-1])
+    for k in reversed(numbers) if max_offset else ():
+        detoured = _window_with_offset(arm, route, window(k))
+        if detoured is None or detoured.tip_offset > max_offset:  # a narrower window needs the same detour
             return None
-        if _follows_detour(arm, route, around):
-            return k, around
+        if _follows_detour(arm, route, detoured):
+            return k, detoured
     return None
 
 
 def _chain_through_window(
-    arm: Arm, route: Route, s: Array, c: Chain, next_chain: Chain, j: int, allowed: tuple[float, float]
+    arm: Arm, route: Route, s: Array, chain: Chain, next_chain: Chain, j: int, allowed: tuple[float, float]
 ) -> Chain | None:
-    """A chain up to a window about sample j, and from there on another one, or itself again; None: none is allowed."""
-    next_sample = max(j, next_chain.first)  # exactly on the singularity one may end, and the other one begin behind it
-    if not (c.first <= j <= c.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _WINDOW_GAP):
+    """A chain up to a window around sample j, then `next_chain`, which may be the same; None: no window is allowed."""
+    next_sample = max(j, next_chain.first)  # at a singularity one chain may end before the other begins
+    if not (chain.first <= j <= chain.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _WINDOW_GAP):
         return None
-    step = joint_change(arm, c.q[j - c.first], next_chain.q[next_sample - next_chain.first])
+    step = joint_change(arm, chain.q[j - chain.first], next_chain.q[next_sample - next_chain.first])
     if np.abs(step[:3]).max() > _ARM_MOVEMENT:
         return None
-    spans = list(_window_spans(route, s, c, next_chain, j))
+    spans = list(_window_spans(route, s, chain, next_chain, j))
 
     @cache
     def window(k: int) -> Window:
         a, b = spans[k]
-        return _window_between(arm, route, s[[a, b]], c.q[a - c.first], next_chain.q[b - next_chain.first])
+        return _window_between(arm, route, s[[a, b]], chain.q[a - chain.first], next_chain.q[b - next_chain.first])
 
     best = _widest_window(arm, route, window, range(len(spans)), allowed)
     if best is None:
         return None
-    (a, b), chosen = spans[best[0]], best[1]
-    inside = _joints_in_window(arm, route, chosen, s[a + 1 : b])
-    offset = chosen.q[1] - next_chain.q[b - next_chain.first]
-    q = np.concatenate([c.q[: a + 1 - c.first], inside, next_chain.q[b - next_chain.first :] + offset])
-    left, right = c.labels[: j - c.first], next_chain.labels[next_sample - next_chain.first :]
+    (a, b), crossing = spans[best[0]], best[1]
+    q_inside = _joints_in_window(arm, route, crossing, s[a + 1 : b])
+    offset = crossing.q[1] - next_chain.q[b - next_chain.first]
+    q = np.concatenate([chain.q[: a + 1 - chain.first], q_inside, next_chain.q[b - next_chain.first :] + offset])
+    left, right = chain.labels[: j - chain.first], next_chain.labels[next_sample - next_chain.first :]
     labels = np.concatenate([left, np.repeat(right[:1], len(q) - len(left) - len(right)), right])
-    return Chain(arm, c.first, q, labels, (*c.windows, chosen))
+    return Chain(arm, chain.first, q, labels, (*chain.windows, crossing))
 
 
 def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array:
@@ -177,39 +178,40 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
     if window.detour is None or not len(s):
         return q
     q = correct_to_route(arm, route.task, q, add_detours(route, (window,)).targets(s), steps=12)
-    bent = np.abs(_wrist_volume(arm, q)) > _VOLUME_SHARE  # nearer to straight joints 4 and 6 go on as they do beside it
+    # interpolate joints 4 and 6 where the wrist is nearly straight
+    bent = np.abs(_wrist_volume(arm, q)) > _VOLUME_SHARE
     lengths = np.concatenate([[window.begin], s[bent], [window.end]])
-    beside = np.concatenate([window.q[:1], q[bent], window.q[1:]])
-    for j in (3, 5):
-        q[~bent, j] = np.interp(s[~bent], lengths, beside[:, j])
+    q_known = np.concatenate([window.q[:1], q[bent], window.q[1:]])
+    for joint in (3, 5):
+        q[~bent, joint] = np.interp(s[~bent], lengths, q_known[:, joint])
     return q
 
 
 def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None:
-    """The window with the tip aside, as little as it can be, to where the wrist is straight; None: it is nowhere."""
+    """The window with the smallest detour of the tip to a straight wrist; None: the wrist is nowhere straight in it."""
     s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     q = window.joints(arm, route, s)
-    bent = _wrist_volume(arm, q)
-    flips = np.flatnonzero(bent[:-1] * bent[1:] <= 0)
-    if len(flips) != 1:
+    volumes = _wrist_volume(arm, q)
+    crossings = np.flatnonzero(volumes[:-1] * volumes[1:] <= 0)
+    if len(crossings) != 1:
         return None
-    i = int(flips[0])
-    f = float(bent[i] / (bent[i] - bent[i + 1]))
+    i = int(crossings[0])
+    f = float(volumes[i] / (volumes[i] - volumes[i + 1]))
     posture, length = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
     free = [0, 1, 2, 3, 5]
-    for _ in range(_NEWTON_STEPS):  # the tool's direction first, then the tip as near as it goes; joint 5 is straight
-        target, beyond = route.targets(np.array([length, length + _SLOPE_STEP]))
-        along = (beyond - target)[:3, 3] / _SLOPE_STEP
+    for _ in range(_NEWTON_STEPS):  # keep the direction, then move the tip close; joint 5 stays straight
+        target, next_target = route.targets(np.array([length, length + _SLOPE_STEP]))
+        tangent = (next_target - target)[:3, 3] / _SLOPE_STEP
         T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
         displacement = T[:3, 3] - target[:3, 3]
         miss = np.concatenate([-_MIN_WEIGHT * displacement, _small_turns(T, target)])
         posture[free] += np.linalg.lstsq(np.concatenate([_MIN_WEIGHT * J[:3], J[3:]]), miss, rcond=1e-9)[0]
-        length += float(displacement @ along)  # what leads along the path is no way aside
+        length += float(displacement @ tangent)  # the part along the path is no detour
     return replace(window, turned=0.0, detour=Detour(window.begin, window.end, displacement))
 
 
 def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
-    """Whether the joints follow a window's detour, all along."""
+    """Whether the joints meet the detoured targets in the whole window."""
     s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     T, goal = fk(arm, _joints_in_window(arm, route, window, s)), add_detours(route, (window,)).targets(s)
     missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
@@ -223,7 +225,7 @@ def _small_turns(T: Array, target: Array) -> Array:
 
 
 def _window_between(arm: Arm, route: Route, lengths: Array, start: Array, end: Array) -> Window:
-    """From a posture to another one, (n,) each, at lengths `lengths` (2,)."""
+    """The window from posture `start` to `end`, (n,) each, at lengths (2,)."""
     q = np.stack([start, start + joint_change(arm, start, end)])
     slopes = []
     for s, posture in zip(lengths.tolist(), q, strict=True):

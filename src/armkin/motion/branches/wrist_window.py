@@ -1,7 +1,7 @@
-"""A stretch of a route on which the wrist goes straight through a singularity.
+"""A window: the stretch of a route on which the wrist passes a singularity without a swing of joint 4.
 
-Either its joints are cubics and the other three hold the tip on the path, the tool turned a little; or the tip goes
-aside within the tolerance, to where the wrist is straight, and the tool keeps its direction.
+In one kind the wrist joints are cubics, the first three joints hold the tip on the path, and the tool turns a little.
+In the other the tip makes a detour within the tolerance to where the wrist is straight, and the tool does not turn.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MAX_STEP = 0.1  # length [rad], at most, of a step of Newton's method
 
 @dataclass(frozen=True)
 class Window:
-    """From length `begin` to `end`: joint values and their slopes at both, and how far the tool is turned inside."""
+    """Joint values and slopes at both ends of a window, and how far the tool turns aside in it."""
 
     begin: float
     end: float
@@ -41,7 +41,7 @@ class Window:
         return 0.0 if self.detour is None else float(np.linalg.norm(self.detour.displacement))
 
     def joints(self, arm: Arm, route: Route, s: Array, offset: Array | float = 0.0) -> Array:
-        """Joint values at lengths s (N,) inside: (N, n); offset: whole turns (n,) of a copy."""
+        """Joint values at lengths s (N,) in the window: (N, n); offset: whole turns (n,) of a copy."""
         h = self.end - self.begin
         f = ((s - self.begin) / h)[:, None]
         d0, d1, chord = self.d[0] * h, self.d[1] * h, self.q[1] - self.q[0]
@@ -49,7 +49,7 @@ class Window:
         goal = route.targets(s)[:, :3, 3]
         for _ in range(_NEWTON_STEPS):
             miss = goal - position(arm, q)
-            # the first three joints may be exactly singular somewhere
+            # nudged, as the first three joints may be exactly singular
             step = nudged(np.linalg.solve, np.asarray(jacobian(arm, q))[:, :3, :3], miss[:, :, None])[..., 0]
             size = np.abs(step).max(axis=1, initial=1e-300, keepdims=True)
             q[:, :3] += np.minimum(_MAX_STEP / size, 1.0) * step
@@ -58,7 +58,7 @@ class Window:
         return np.asarray(q + offset)
 
     def turns_to_copy(self, arm: Arm, q: Array) -> Array:
-        """Whole turns (n,) from a window to the copy that a run is on; q: (n,) of it, somewhere inside."""
+        """Whole turns (n,) from the window to a run's copy of it; q: (n,) joint values of the run in the window."""
         turns = whole_turns(arm)
         return np.asarray(turns * np.rint((q - self.q.mean(axis=0)) / turns))
 

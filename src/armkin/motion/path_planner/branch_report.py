@@ -1,4 +1,4 @@
-"""What was found about a path's branches: noted in the plan, and in words where the path is not carried."""
+"""The report on a path's branches: the fields of a plan, and the error text of a path that no branch carries."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.motion.branches.branch_path import CarriedRoute
     from armkin.motion.timing.trajectory import Trajectory
 
-_SAME_POSE = 1e-6  # distance [rad | mm] of two postures that are one
+_SAME_POSE = 1e-6  # distance [rad | mm] below which two postures count as the same
 _WHY = {
     "end": "carries all",
     "reach": "the path leaves the reach",
@@ -32,44 +32,48 @@ _WHY = {
 
 def note_runs(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
     """Add runs, branches and breaks of a group of moves to the plan."""
-    c, base, arm = carried.columns, plan.length, plan.arm
-    plan.samples += len(c.s)
-    plan.complete = plan.complete and c.complete
+    columns, offset, arm = carried.columns, plan.length, plan.arm
+    plan.samples += len(columns.s)
+    plan.complete = plan.complete and columns.complete
     if not plan.branches:
         plan.branches = _start_branches(arm, carried, near)
-    for k, run in enumerate(carried.runs):
+    for run_number, run in enumerate(carried.runs):
         for window in run.chain.windows:
-            if c.s[run.first] <= window.begin and window.end <= c.s[run.last]:
-                plan.passed.append(Passed(base + window.begin, base + window.end, window.turned, window.tip_offset))
+            if columns.s[run.first] <= window.begin and window.end <= columns.s[run.last]:
+                plan.passed.append(Passed(offset + window.begin, offset + window.end, window.turned, window.tip_offset))
         q = run.chain.joints(run.first, run.last, near)
-        begin, end = base + float(c.s[run.first]), base + float(c.s[run.last])
+        begin, end = offset + float(columns.s[run.first]), offset + float(columns.s[run.last])
         if end > begin:
-            plan.runs.append(PathRun(begin, end, _branch_names(c, run, base), q[0].copy(), q[-1].copy()))
-        if run.last < len(c.s) - 1 or k + 1 < len(carried.runs):
-            plan.reconfigurations.append(_reconfiguration_at(arm, c, run.chain, run.first, base))
+            plan.runs.append(PathRun(begin, end, _branch_names(columns, run, offset), q[0].copy(), q[-1].copy()))
+        if run.last < len(columns.s) - 1 or run_number + 1 < len(carried.runs):
+            plan.reconfigurations.append(_reconfiguration_at(arm, columns, run.chain, run.first, offset))
 
 
-def _branch_names(c: Columns, run: Run, base: float) -> list[tuple[float, str]]:
-    """Where each branch name begins on a run."""
+def _branch_names(columns: Columns, run: Run, offset: float) -> list[tuple[float, str]]:
+    """The lengths [mm] at which the branch name changes on a run, each with the new name."""
     labels = run.chain.labels[run.first - run.chain.first : run.last - run.chain.first + 1]
     changes = [0, *(1 + np.flatnonzero(np.diff(labels))).tolist()]
-    return [(base + float(c.s[run.first + i]), _branch_name(c, int(labels[i]))) for i in changes]
+    return [
+        (offset + float(columns.s[run.first + change]), _branch_name(columns, int(labels[change])))
+        for change in changes
+    ]
 
 
 def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
-    """The branches at the start, the one that carries farthest first; of equals the one that is taken."""
-    c, ranked, chosen = carried.columns, [], None
+    """The branches at the start, sorted by how far each carries; of equal ones the chosen branch comes first."""
+    columns, ranked, chosen = carried.columns, [], None
     for chain in carried.chains:
         if chain.first == 0:
-            e = chain.carries_to(0)
-            q = (chain.joints(0, e, near) if e >= 0 else chain.q)[0].copy()  # a view would keep the whole chain
-            far = float(c.s[e]) if e >= 0 else 0.0
-            why = reason_text(arm, _reconfiguration_at(arm, c, chain, 0, 0.0))
-            ranked.append((e, Branch(_branch_name(c, int(chain.labels[0])), q, far, why)))
+            last = chain.carries_to(0)
+            joints = chain.joints(0, last, near) if last >= 0 else chain.q
+            q = joints[0].copy()  # a view would keep the whole chain
+            length = float(columns.s[last]) if last >= 0 else 0.0
+            end_text = reason_text(arm, _reconfiguration_at(arm, columns, chain, 0, 0.0))
+            ranked.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
             if carried.runs and chain is carried.runs[0].chain:
                 chosen = ranked[-1][1]
     ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not chosen))
-    distinct: list[Branch] = []  # with and without the wrist straight through a singularity is one branch
+    distinct: list[Branch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
     for _, branch in ranked:
         q = branch.start_joints
         if not any(
@@ -79,23 +83,30 @@ def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch
     return distinct
 
 
-def _branch_name(c: Columns, label: int) -> str:
-    return c.names[label] if 0 <= label < len(c.names) else ""
+def _branch_name(columns: Columns, label: int) -> str:
+    return columns.names[label] if 0 <= label < len(columns.names) else ""
 
 
-def _reconfiguration_at(arm: Arm, c: Columns, chain: Chain, first: int, base: float) -> Reconfiguration:
-    """Where and why a run from a sample ends."""
-    why, joint, value, beyond = end_reason(c, chain, first)
-    e = max(chain.carries_to(first), 0)
-    q = chain.q[min(e + 1, chain.last) - chain.first].copy() if why == "hit" else None
-    hit = "" if q is None else hit_text(arm, q)
+def _reconfiguration_at(arm: Arm, columns: Columns, chain: Chain, first: int, offset: float) -> Reconfiguration:
+    """The place and the reason at which a run from sample `first` ends."""
+    reason, joint, value, status_beyond = end_reason(columns, chain, first)
+    last_sample = max(chain.carries_to(first), 0)
+    q = chain.q[min(last_sample + 1, chain.last) - chain.first].copy() if reason == "hit" else None
+    hit_words = "" if q is None else hit_text(arm, q)
     return Reconfiguration(
-        base + float(c.s[e]), why, None if joint is None else arm.joint_names[joint], joint, value, beyond, hit, q
+        offset + float(columns.s[last_sample]),
+        reason,
+        None if joint is None else arm.joint_names[joint],
+        joint,
+        value,
+        status_beyond,
+        hit_words,
+        q,
     )
 
 
 def reason_text(arm: Arm, reconfiguration: Reconfiguration) -> str:
-    """Why a branch carries no farther."""
+    """The reason, in words, why a branch ends."""
     if reconfiguration.hit:
         return reconfiguration.hit
     if reconfiguration.index is None or reconfiguration.value is None:
@@ -105,9 +116,9 @@ def reason_text(arm: Arm, reconfiguration: Reconfiguration) -> str:
 
 
 def deviation_text(plan: PathPlan) -> str:
-    """How far the motion leaves the path, or the points that it was fitted to."""
+    """How far the motion leaves the path, or the points to which it was fitted."""
     if plan.rounded_most is None:
-        bound = np.ceil(plan.deviation * 1e4) / 1e4  # what it says is a bound, too
+        bound = np.ceil(plan.deviation * 1e4) / 1e4  # round up: the printed number must be a bound as well
         return f"at most {bound:.4f} mm from the path; {plan.tolerance:g} allowed"
     return (
         f"points within {plan.deviation:.4f} mm of the motion, the farthest at {plan.rounded_most:.3f} mm; "
@@ -116,20 +127,20 @@ def deviation_text(plan: PathPlan) -> str:
 
 
 def wrist_pass_lines(plan: PathPlan) -> list[str]:
-    """How each wrist singularity is passed straight through."""
+    """One line of text for each wrist singularity that the path passes without a flip of the wrist."""
     lines = []
     for singularity in plan.passed:
         tip = f"the tip at most {singularity.aside:.2g} mm aside, the tool not turned"
         tool = f"the tip on the path, the tool turned by at most {singularity.turned / units.DEGREE:.2g} deg"
-        how = tool if singularity.turned else tip
+        deviation = tool if singularity.turned else tip
         lines.append(
-            f"a wrist singularity is passed between {singularity.begin:.3f} and {singularity.end:.3f} mm: {how}"
+            f"a wrist singularity is passed between {singularity.begin:.3f} and {singularity.end:.3f} mm: {deviation}"
         )
     return lines
 
 
 def plan_fields(plan: PathPlan) -> dict[str, Any]:
-    """A plan as data of JSON [mm, deg, s]; of one that was refused what is known of it."""
+    """A plan as JSON data [mm, deg, s]; a refused plan has the fields of its branches and None for its motion."""
     arm = plan.arm
     singularity = None
     if plan.nearest_singularity is not None:
@@ -160,7 +171,7 @@ def plan_fields(plan: PathPlan) -> dict[str, Any]:
 
 
 def _motion_fields(plan: PathPlan) -> dict[str, Any]:
-    """What is known of a plan's motion; keys that are None where there is none."""
+    """The JSON fields of a plan's motion, which `plan_fields` sets to None for a plan without one."""
     motion, names = plan.motion, plan.arm.joint_names
     return {
         "duration_s": plan.duration,
@@ -172,7 +183,7 @@ def _motion_fields(plan: PathPlan) -> dict[str, Any]:
 
 
 def _optional_fields(plan: PathPlan) -> dict[str, Any]:
-    """Keys that a plan without such things does not have."""
+    """The JSON fields that only some plans have: held joints, wrist singularities, approach, clearance."""
     fields: dict[str, Any] = {"held": held_joint_values(plan)} if plan.held else {}
     if plan.turned is not None:
         fields["turned_deg"] = float(np.rad2deg(plan.turned))
@@ -222,7 +233,7 @@ def _singularity_fields(singularity: Passed) -> dict[str, Any]:
 
 
 def held_joint_values(plan: PathPlan) -> dict[str, float]:
-    """Joints that are held along a path, and where [deg | mm]."""
+    """The joints that are held along a path, each with its value [deg | mm]."""
     return {name: _in_units(plan.arm, plan.arm.joint_names.index(name), value) for name, value in plan.held.items()}
 
 
@@ -236,19 +247,19 @@ def _in_units(arm: Arm, joint: int, value: float) -> float:
 
 
 def path_refusal(plan: PathPlan, carried: CarriedRoute, branch: str | None = None) -> NoSolutionError:
-    """The error of a path that is not carried, `branch` being asked for; `plan` of it tells the rest."""
-    best, joints = plan.branches[0] if plan.branches else None, None
+    """The error of a path that no branch carries, with its plan; branch: the name that the user asked for."""
+    best_branch, joints = plan.branches[0] if plan.branches else None, None
     length = carried.route.length
-    if best is None:
+    if best_branch is None:
         text = "the path's first point is out of reach"
     elif branch is not None and (not carried.runs or carried.runs[0].first > 0):
         text = f"branch '{branch}' is not within the limits at the path's start; "
-        text += f"{best.name or 'another'} carries {best.carries:.3f} of {length:.3f} mm"
+        text += f"{best_branch.name or 'another'} carries {best_branch.carries:.3f} of {length:.3f} mm"
     elif not carried.runs or carried.runs[0].first > 0:
-        text = f"no branch is within the limits at the path's start: {best.ends_because}"
+        text = f"no branch is within the limits at the path's start: {best_branch.ends_because}"
     else:
-        far = float(carried.columns.s[carried.runs[0].last])
-        text = f"no branch carries the whole path: {far:.3f} of {length:.3f} mm, then "
+        carried_length = float(carried.columns.s[carried.runs[0].last])
+        text = f"no branch carries the whole path: {carried_length:.3f} of {length:.3f} mm, then "
         text += reason_text(plan.arm, plan.reconfigurations[0])
         joints = plan.reconfigurations[0].joints
         changes = len(carried.runs) - 1

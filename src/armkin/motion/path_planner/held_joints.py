@@ -1,4 +1,4 @@
-"""Paths of arms with joints held at fixed values: planned for the joints that are free, told and moved for all."""
+"""Paths of arms with joints held at fixed values: the free joints are planned, the plan has the values of all."""
 
 from __future__ import annotations
 
@@ -36,43 +36,43 @@ def path_held(
     `armkin.path` does, NoSolutionError also for a value outside its joint's limits.
     """
     check_rates(arm)
-    free = lock(arm, held)
-    free_indices = [k for k, name in enumerate(arm.joint_names) if name not in held]
-    standing = request.start_joints(arm)
-    ready = unlock(arm, held, standing[free_indices])
-    check_limits(arm, ready[None])
+    free_arm = lock(arm, held)
+    free_indices = [number for number, name in enumerate(arm.joint_names) if name not in held]
+    start = request.start_joints(arm)
+    held_start = unlock(arm, held, start[free_indices])
+    check_limits(arm, held_start[None])
     near, jerk = (
         None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[free_indices]
         for value in (request.near, request.jerk)
     )
-    of_free = replace(request, start=standing[free_indices], near=near, jerk=jerk)
+    free_request = replace(request, start=start[free_indices], near=near, jerk=jerk)
     try:
-        plan = plan_path(free, path_numbers.as_path_file(free, moves, request.task), of_free)
+        plan = plan_path(free_arm, path_numbers.as_path_file(free_arm, moves, request.task), free_request)
     except NoSolutionError as error:
         if error.plan is not None:
             error.plan = _plan_of_all_joints(error.plan, arm, held)
         raise
-    full_plan, begun = _plan_of_all_joints(plan, arm, held), unlock(arm, held, plan.motion.start)
+    full_plan, first_posture = _plan_of_all_joints(plan, arm, held), unlock(arm, held, plan.motion.start)
     stretches = [_unlock_stretch(item, arm, held) for item in plan.motion.stretches]
     pace = plan.speed, request.accel, check_jerk(arm, request.jerk)
-    if begin is not None and (first := straight_move(arm, begin, begun, *pace)).duration > 0:
-        stretches, begun, shift = [first, *stretches], begin, 1
+    if begin is not None and (first_move := straight_move(arm, begin, first_posture, *pace)).duration > 0:
+        stretches, first_posture, shift = [first_move, *stretches], begin, 1
     else:
         shift = 0
-    for k, (_, base) in plan.on_path.items():
-        full_plan.note_stretch(k + shift, stretches[k + shift], base)
-    full_plan.approach = approach_move(arm, standing, begun, *pace)
+    for number, (_, base) in plan.on_path.items():
+        full_plan.note_stretch(number + shift, stretches[number + shift], base)
+    full_plan.approach = approach_move(arm, start, first_posture, *pace)
     markers = [replace(item, before=item.before + shift) for item in plan.markers]
-    return prove_plan(full_plan.set_motion(begun, stretches, markers))
+    return prove_plan(full_plan.set_motion(first_posture, stretches, markers))
 
 
 def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
-    """What is known of a plan's branches, with the values of all joints; without its motion."""
+    """A plan of the free joints with the values of all joints in its branches and runs; its motion is left out."""
 
     def unlocked(q: Array) -> Array:
         return unlock(arm, held, q)
 
-    worst = plan.nearest_singularity
+    singularity = plan.nearest_singularity
     return replace(
         plan,
         arm=arm,
@@ -82,7 +82,7 @@ def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> 
         reconfigurations=[
             replace(r, index=None if r.joint is None else arm.joint_names.index(r.joint)) for r in plan.reconfigurations
         ],
-        nearest_singularity=None if worst is None else (*worst[:2], unlocked(worst[2])),
+        nearest_singularity=None if singularity is None else (*singularity[:2], unlocked(singularity[2])),
         markers=[],
         trajectory=None,
         approach=None,
@@ -101,6 +101,6 @@ def _unlock_stretch(stretch: Stretch, arm: Arm, held: Mapping[str, float]) -> St
 
 
 def _unlock_curve(curve: Curve, arm: Arm, held: Mapping[str, float]) -> Curve:
-    still = dict.fromkeys(held, 0.0)
-    way = curve.path
-    return Curve(Knots(way.s, unlock(arm, held, way.q), unlock(arm, still, way.d)), curve.x)
+    zero_slopes = dict.fromkeys(held, 0.0)
+    knots = curve.path
+    return Curve(Knots(knots.s, unlock(arm, held, knots.q), unlock(arm, zero_slopes, knots.d)), curve.x)

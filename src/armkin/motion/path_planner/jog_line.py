@@ -1,4 +1,4 @@
-"""A line that a hand holds down: from where the arm stands along an axis, as far as its branch carries it."""
+"""Jogging of the tip: the longest straight line from the present posture along an axis that the branch carries."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ if TYPE_CHECKING:
 
 MAX_TOOL_SPEED = 250.0  # speed [mm/s] of the tool at 100 %: ISO 10218-1 allows no more where an arm is guided by hand
 MAX_TURN_SPEED = np.deg2rad(60.0)  # speed [rad/s] at which the tool turns at 100 %
-MAX_SECONDS = 10.0  # time [s], at most, of a line
-POSTURE_STEP = 2.0  # distance [mm], or hundredths of a radian, between postures that are looked at
-SLOW_SHARE = 0.1  # share of MAX_TOOL_SPEED: where joints at full speed carry the tool slower, a singularity is near
+MAX_SECONDS = 10.0  # longest duration [s] of a line
+POSTURE_STEP = 2.0  # distance [mm], or in hundredths of a radian, between the postures that are checked
+SLOW_SHARE = 0.1  # share of MAX_TOOL_SPEED; a tool that is slower with joints at full speed is near a singularity
 Frame = Literal["base", "tool"]
 
 
 def jog_axes(arm: Arm) -> tuple[str, ...]:
-    """The axes of a tip that may be jogged: the task's own numbers; of a pose x y z and turns about these.
+    """The axes along which the tip may be jogged: the numbers of the task, or x y z rx ry rz where it is a pose.
 
-    None of an arm with a joint to spare: a line of its tip is no one motion.
+    A redundant arm has none, since one line of its tip does not determine the motion of its joints.
     """
     task = task_for(arm, None)
     if arm.n > task.constraints:
@@ -55,60 +55,65 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     task = task_for(arm, None)
     if axis not in jog_axes(arm):
         raise UsageError(f"axis: '{axis}' is none of {', '.join(jog_axes(arm))}")
-    turns = axis not in ("x", "y", "z")
-    top = MAX_TURN_SPEED if turns else MAX_TOOL_SPEED
-    step = np.sign(share) * (POSTURE_STEP / 100 if turns else POSTURE_STEP)
-    most = max(int(min(MAX_SECONDS * abs(share) * top, np.pi * 0.9 if turns else 2 * arm.reach) / abs(step)), 1)
-    count, why = _steps_carried(arm, task, q, axis, frame, step, most)
+    rotates = axis not in ("x", "y", "z")
+    top_speed = MAX_TURN_SPEED if rotates else MAX_TOOL_SPEED
+    step = np.sign(share) * (POSTURE_STEP / 100 if rotates else POSTURE_STEP)
+    max_steps = max(
+        int(min(MAX_SECONDS * abs(share) * top_speed, np.pi * 0.9 if rotates else 2 * arm.reach) / abs(step)), 1
+    )
+    count, end_text = _steps_carried(arm, task, q, axis, frame, step, max_steps)
     while count:
         target = _shift_target(arm, task, q, axis, frame, step * count)
         [line] = targets_out(task.labels, target[None])
         try:
-            speed = {"speed": 100 * abs(share)} if turns else {"tool_speed": abs(share) * MAX_TOOL_SPEED}
+            speed = {"speed": 100 * abs(share)} if rotates else {"tool_speed": abs(share) * MAX_TOOL_SPEED}
             plan = path(arm, {"moves": [{"line": list(line)}], **speed}, start=q)
         except NoSolutionError as error:
-            count, why = count // 2, error.message  # a hit between two postures, or what the corner of a branch hides
+            count, end_text = count // 2, error.message  # a hit or branch end lies between steps
             continue
-        return plan, why
-    raise NoSolutionError(f"the tip does not move along {axis} of the {frame}: {why}")
+        return plan, end_text
+    raise NoSolutionError(f"the tip does not move along {axis} of the {frame}: {end_text}")
 
 
-def _steps_carried(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: float, most: int) -> tuple[int, str]:
-    """How many steps the arm's own branch follows, and what ends it."""
+def _steps_carried(
+    arm: Arm, task: Task, q: Array, axis: str, frame: Frame, step: float, max_steps: int
+) -> tuple[int, str]:
+    """How many steps the present branch carries, and the reason why it ends."""
     unit, posture = radian_or_reach(arm), q
-    top = MAX_TOOL_SPEED if axis in ("x", "y", "z") else MAX_TURN_SPEED
-    stuck = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
-    before, leaving = np.inf, False  # an arm that stands near a singularity may leave it
-    for k in range(1, most + 1):
-        goal = _shift_target(arm, task, q, axis, frame, step * k)[None]
+    top_speed = MAX_TOOL_SPEED if axis in ("x", "y", "z") else MAX_TURN_SPEED
+    starts_in_hit = bool(arm.keep_out) and float(clearance(arm, q).mm) < 0
+    last_slowness, near_singularity = np.inf, False  # an arm that starts near a singularity may move away from it
+    for step_number in range(1, max_steps + 1):
+        goal = _shift_target(arm, task, q, axis, frame, step * step_number)[None]
         r, J = scaled(arm, task, posture[None], goal)
-        move = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
-        blocked = np.linalg.norm(J[0] @ move - r[0]) > 0.1 * np.linalg.norm(r[0])  # no joint speed leads there
-        first = move * unit
-        slow = float(np.max(np.abs(first) / arm.max_speed)) * SLOW_SHARE * top / abs(step)
-        if blocked or (slow > 1.0 and slow >= before):
-            return 0 if leaving and k == 2 else k - 1, "a singularity is near"
-        before, leaving = slow, slow > 1.0
-        posture = posture + first
+        change = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
+        # no joint motion moves the tip this way
+        blocked = np.linalg.norm(J[0] @ change - r[0]) > 0.1 * np.linalg.norm(r[0])
+        joint_step = change * unit
+        slowness = float(np.max(np.abs(joint_step) / arm.max_speed)) * SLOW_SHARE * top_speed / abs(step)
+        if blocked or (slowness > 1.0 and slowness >= last_slowness):
+            return 0 if near_singularity and step_number == 2 else step_number - 1, "a singularity is near"
+        last_slowness, near_singularity = slowness, slowness > 1.0
+        posture = posture + joint_step
         for _ in range(3):
             r, J = scaled(arm, task, posture[None], goal)
             posture = posture + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
         if not float(np.abs(scaled(arm, task, posture[None], goal)[0]).max()) < 1e-7:
-            return k - 1, "it is out of reach" if k > 1 else "a singularity is near"
-        if why := _stop_reason(arm, posture, stuck):
-            return k - 1, why
-    return most, ""
+            return step_number - 1, "it is out of reach" if step_number > 1 else "a singularity is near"
+        if stop_text := _stop_reason(arm, posture, starts_in_hit):
+            return step_number - 1, stop_text
+    return max_steps, ""
 
 
-def _stop_reason(arm: Arm, q: Array, stuck: bool) -> str:
-    """The limit or the hit at a posture, in words; stuck: the arm touches something to begin with."""
+def _stop_reason(arm: Arm, q: Array, starts_in_hit: bool) -> str:
+    """The limit or the hit at a posture, in words; starts_in_hit: the line begins in contact, so hits do not end it."""
     outside = (q < arm.lower) | (q > arm.upper)
     if outside.any():
         return f"{arm.joint_names[int(np.argmax(outside))]} is at its limit"
-    if arm.keep_out and not arm.ignores_keep_out and not stuck:
-        near = clearance(arm, q)
-        if float(near.mm) < 0:
-            return f"{near.body!s} would hit {near.other!s}"
+    if arm.keep_out and not arm.ignores_keep_out and not starts_in_hit:
+        body_clearance = clearance(arm, q)
+        if float(body_clearance.mm) < 0:
+            return f"{body_clearance.body!s} would hit {body_clearance.other!s}"
     return ""
 
 
@@ -121,12 +126,12 @@ def _shift_target(arm: Arm, task: Task, q: Array, axis: str, frame: Frame, dista
         return target
     unit: Array = np.eye(3)["xyz".index(axis[-1])]
     if axis[0] == "r":
-        turn = _rotation_about(unit, distance)
-        target[:3, :3] = T[:3, :3] @ turn if frame == "tool" else turn @ T[:3, :3]
+        rotation = _rotation_about(unit, distance)
+        target[:3, :3] = T[:3, :3] @ rotation if frame == "tool" else rotation @ T[:3, :3]
         return target
-    way = distance * (T[:3, :3] @ unit if frame == "tool" else unit)
-    place = target[:3, 3] if task.orientation == "full" else target[: task.position]
-    place += way[: len(place)]
+    displacement = distance * (T[:3, :3] @ unit if frame == "tool" else unit)
+    tip = target[:3, 3] if task.orientation == "full" else target[: task.position]
+    tip += displacement[: len(tip)]
     return target
 
 

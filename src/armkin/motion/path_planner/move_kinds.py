@@ -1,4 +1,4 @@
-"""What each kind of move does: a target, a piece of the tool's way, a joint move, or an event between them."""
+"""One function for each kind of move: it adds a target, a piece of tool path, a joint move or an event to a walk."""
 
 from __future__ import annotations
 
@@ -44,15 +44,15 @@ def _add_line(walk: Walk, move: Move, value: list[float], inner: bool = False) -
 
 
 def _add_polyline(walk: Walk, move: Move, value: list[list[float]]) -> None:
-    if walk.corner_blend(move, inner=True) is None:  # all its inner points gather, the last one as its own corner says
+    if walk.corner_blend(move, inner=True) is None:  # the inner points form one curve; the last has its own corner
         _gather_points(walk, move, value[:-1])
         value = value[-1:]
-    for k, target in enumerate(value):
-        _add_line(walk, move, target, inner=k < len(value) - 1)
+    for index, target in enumerate(value):
+        _add_line(walk, move, target, inner=index < len(value) - 1)
 
 
 def _gather_points(walk: Walk, move: Move, targets: list[list[float]]) -> None:
-    """Put targets to the points that become one smooth curve."""
+    """Add targets to the points through which one smooth curve will be fitted."""
     if walk.dense is None:
         walk.dense = Polyline(walk.task, walk.spot)
         walk.group = (
@@ -72,8 +72,8 @@ def _add_arc(walk: Walk, move: Move, value: Any) -> None:
 def _add_circle(walk: Walk, move: Move, value: Any) -> None:
     if value.turns == 0:
         raise UsageError("circle: turns 0 is no circle")
-    flat = walk.task.position == 2
-    normal = np.array([0.0, 0.0, 1.0]) if flat else path_numbers.coordinates(walk.task, value.normal)
+    is_planar = walk.task.position == 2
+    normal = np.array([0.0, 0.0, 1.0]) if is_planar else path_numbers.coordinates(walk.task, value.normal)
     if np.linalg.norm(normal) < 1e-9:
         raise UsageError(f"circle: its normal {value.normal} has no length; give the direction of the circle's axis")
     centre, angle = path_numbers.coordinates(walk.task, value.centre), 2 * np.pi * value.turns
@@ -85,18 +85,18 @@ def _add_spline(walk: Walk, move: Move, value: list[list[float]]) -> None:
 
 
 def _add_offset(walk: Walk, move: Move, value: Any) -> None:
-    d = path_numbers.coordinates(walk.task, value.xyz)
+    displacement = path_numbers.coordinates(walk.task, value.xyz)
     if value.frame == "tool":
         if walk.task.orientation == "full":
             assert walk.spot.turned is not None
-            d = walk.spot.turned @ d
-        else:  # the tool's axes are known once the joints are
-            typed = walk.spot.sums
+            displacement = walk.spot.turned @ displacement
+        else:  # the tool's axes depend on the joints, so a posture has to be chosen first
+            typed_sums = walk.spot.sums
             walk.take_posture()
             walk.begin_group(None)
-            walk.keep_typed_turns(typed)
-            d = (fk(walk.arm, walk.q)[:3, :3] @ np.append(d, 0.0)[:3])[: len(d)]
-    walk.add_piece(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + d)))
+            walk.keep_typed_turns(typed_sums)
+            displacement = (fk(walk.arm, walk.q)[:3, :3] @ np.append(displacement, 0.0)[:3])[: len(displacement)]
+    walk.add_piece(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + displacement)))
 
 
 def _queue_wait(walk: Walk, move: Move, value: float) -> None:

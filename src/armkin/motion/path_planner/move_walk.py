@@ -1,4 +1,4 @@
-"""The moves of a path, one after another: joint moves at once, moves of the tool in groups on one branch."""
+"""Plans the moves of a path in order: joint moves one by one, moves of the tool in groups that keep one branch."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PathOptions:
-    """What `path` was asked for beside the moves and their pace."""
+    """The options of `armkin.path` that are neither moves nor pace."""
 
     task: str | None
     corner: float | Literal["default"] | None  # blend of corners without their own; None: by the tolerance
@@ -58,24 +58,24 @@ class PathOptions:
 
 
 class Walk:
-    """Goes through the moves: joint moves at once, moves of the tool in groups that keep one branch."""
+    """The state of the planner between two moves: joint values, motion so far, and the tool moves not planned yet."""
 
     _spot: Spot | None = None
-    opening = False  # whether the path's first posture is not chosen yet
-    leads: Move | None = None  # the move of the file that leads to a group's first point
-    untried_postures: tuple[Array, ...] = ()  # postures of the last target that were not tried
-    refused: NoSolutionError | None = None  # why the first of them does not do
-    saved_state: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan, before it was reached
-    current_moves = group = 0, 0  # first and last move, from 0: what is done now, and what has gathered
+    opening = False  # whether the path's first posture is still to be chosen
+    leads: Move | None = None  # the move of the file that goes to a group's first point
+    untried_postures: tuple[Array, ...] = ()  # postures of the last target that are still to be tried
+    refused: NoSolutionError | None = None  # the error of the first posture that failed
+    saved_state: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan before that target
+    current_moves = group = 0, 0  # numbers, from 0, of the first and last move: of this step, of the group
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, start: Array, options: PathOptions) -> None:
         self.arm, self.file = arm, file
         self.pace, self.options = pace, options
         with _errors_of_key(file, "task"):
             self.plan = PathPlan(arm, _task_or_none(arm, file, options.task or file.task), pace.tolerance, pace.speed)
-        self.q = start  # where the joints are when all so far is done
+        self.q = start  # joint values at the end of the moves so far
         self.stretches: list[Stretch] = []
-        self.markers: list[Marker] = []  # what happens between stretches
+        self.markers: list[Marker] = []  # grips and pauses between stretches
         self.begin_group(None)
 
     @property
@@ -85,7 +85,7 @@ class Walk:
 
     @property
     def spot(self) -> Spot:
-        """Where the tool is when all that has gathered is done."""
+        """The target of the tool at the end of the moves gathered so far."""
         if self.dense is not None:
             return self.dense.last
         if self._spot is None:
@@ -93,16 +93,16 @@ class Walk:
         return self._spot
 
     def begin_group(self, goal: Spot | None, branch: str | None = None) -> None:
-        """Begin a group: at a target whose branch is free, or where the joints are."""
+        """Begin a group at a target, whose branch may be chosen, or (goal None) at the present joint values."""
         self.goal, self.goal_branch, self.group = goal, branch, self.current_moves
         self._spot = goal
         self.pieces: list[Piece] = []
         self.blends: list[float | None] = []
-        self.dense: Polyline | None = None  # points that have gathered for one curve
+        self.dense: Polyline | None = None  # points for one fitted curve
         self.pauses: dict[int, list[tuple[str, Any]]] = {}
 
     def plan_all(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
-        """The plan of all moves; kinds: what each kind of them does."""
+        """The plan of all moves; kinds: the function that carries out each kind of move."""
         q, number = self.q, 0
         with _errors_of_key(self.file, "start"):
             self._begin()
@@ -119,7 +119,7 @@ class Walk:
         return self.plan.set_motion(self.begun, self.stretches, self.markers)
 
     def _carry_out_move(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
-        """Do a move; behind the last one, what has gathered."""
+        """Carry out a move; the number after the last one closes the group that is still open."""
         if number == len(self.file.moves):
             with _errors_of_moves(self):
                 self.close_group()
@@ -130,7 +130,7 @@ class Walk:
             kinds[move.kind](self, move, getattr(move, move.kind))
 
     def take_posture(self) -> None:
-        """Go to the target that has gathered alone, in a posture; the others are tried if what follows is refused."""
+        """Move to the nearest posture of the group's only target; the others are tried if a later move fails."""
         if self.goal is None or self.pieces:
             self.close_group()
             return
@@ -145,7 +145,7 @@ class Walk:
         self.goal = None
 
     def _restore(self) -> int:
-        """Be again where a posture was taken, with the others left; the number of that move."""
+        """Return to the state before the last posture was chosen, and give the number of that move."""
         untried, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
         vars(self).update(
             {**_copy_state(state), "untried_postures": untried, "refused": refused, "saved_state": self.saved_state}
@@ -154,12 +154,12 @@ class Walk:
         return self.current_moves[0]
 
     def _begin(self) -> None:
-        """Where the path begins: where the arm stands, in a posture, or at a point, which the first moves choose."""
+        """Set the path's first posture: the arm's, the file's joint values, or a point whose branch is chosen later."""
         start = self.file.start
         value = start if start is None or isinstance(start, str) else start.joints
         if start is not None and value is None:
             goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
-            _nearest_posture(self, goal, None)  # refused here, of this key
+            _nearest_posture(self, goal, None)  # raises here, so that the error names the key start
             self.begin_group(goal)
             self.opening = True
         elif value is not None:
@@ -169,18 +169,18 @@ class Walk:
         self.begun = self.q
 
     def fit_dense(self, corner: float | None = None) -> None:
-        """Make the points that have gathered pieces; corner: how their last one is passed."""
+        """Fit curves through the gathered points; corner: the blend at the last point."""
         if self.dense is None:
             return
         dense, self.dense = self.dense, None
         self._spot = dense.last
         pieces = dense.pieces(self.pace.tolerance)
         self.pieces += pieces
-        # curves of points meet where the way turns back: a blend there would pass the points beside it by
+        # fitted curves meet where the path turns back; a blend there would miss the neighbouring points
         self.blends += [None if a.dense is None and b.dense is None else 0.0 for a, b in pairwise(pieces)] + [corner]
 
     def corner_blend(self, move: Move, inner: bool = False) -> float | None:
-        """How the corner at a move's end is passed: the radius of its blend, None: by the tolerance."""
+        """The radius [mm] of the blend at the end of a move; None: the tolerance decides."""
         if move.blend is not None:
             return move.blend
         if self.options.corner == "default":
@@ -188,12 +188,12 @@ class Walk:
         return self.options.corner
 
     def keep_typed_turns(self, sums: Array) -> None:
-        """Where the tool is, sums of angles keep the whole turns that were typed."""
+        """Add to the present target the whole turns of angle sums that the user typed."""
         turns = np.rint((sums - self.spot.sums) / (2 * np.pi))
         self._spot = replace(self.spot, sums=self.spot.sums + 2 * np.pi * turns)
 
     def queue_event(self, kind: str, value: Any) -> None:
-        """Something that happens where the tool is then: behind the moves that have gathered, if there are some."""
+        """Queue a wait or grip after the gathered moves; without any it is emitted at once."""
         self.fit_dense()
         if self.goal is None and not self.pieces:
             self.emit_event(kind, value)
@@ -201,7 +201,7 @@ class Walk:
             self.pauses.setdefault(len(self.pieces), []).append((kind, value))
 
     def emit_event(self, kind: str, value: Any) -> None:
-        """Put the gripper's move or a rest behind the motion so far."""
+        """Append a grip, a pause or a rest to the motion."""
         if kind == "wait" and value == "enter":
             self.markers.append(Marker(len(self.stretches), "pause", None))
         elif kind == "wait":
@@ -210,30 +210,30 @@ class Walk:
             self.markers.append(Marker(len(self.stretches), kind, value))
 
     def add_piece(self, move: Move, piece: Piece) -> None:
-        """Gather a piece of the tool's way; move: whose speed and blend it has."""
+        """Add a piece of tool path to the group, with the speed and blend of its move."""
         speed = None if move.speed is None else move.speed / 100 * self.pace.speed
-        first = (self.group if self.goal is not None or self.pieces else self.current_moves)[0]
-        self.group = first, self.current_moves[1]
+        first_move = (self.group if self.goal is not None or self.pieces else self.current_moves)[0]
+        self.group = first_move, self.current_moves[1]
         self.fit_dense()
         self.pieces.append(replace(piece, speed=speed, tool_speed=move.tool_speed or piece.tool_speed))
         self.blends.append(self.corner_blend(move))
         self._spot = piece.last
 
     def target(self, value: list[float]) -> Spot:
-        """A target from where the tool is: what it leaves out stays."""
+        """A target from the numbers of a move; numbers that it leaves out are those of the present target."""
         return path_numbers.target_spot(self.task, self.spot, value)
 
     # Groups
 
     def close_group(self) -> None:
-        """Plan the group of tool moves that has gathered; what is wrong with it is said of its moves."""
-        moves_now, self.current_moves = self.current_moves, self.group
+        """Plan the group of tool moves; errors then name the moves of the group."""
+        moves_before, self.current_moves = self.current_moves, self.group
         self.fit_dense()
         self._plan_group()
-        self.current_moves = moves_now
+        self.current_moves = moves_before
 
     def _plan_group(self) -> None:
-        """Plan what has gathered: a joint move to a lone target, else the runs of its route, and what happens there."""
+        """Plan the group: a joint move to a single target, else the runs of its route, with waits and grips."""
         if not self.pieces:
             if self.goal is not None:
                 self.append_joint_move(_nearest_posture(self, self.goal, self.goal_branch), self.leads)
@@ -246,14 +246,14 @@ class Walk:
         route, order = join_pieces(self.task, self.pieces, self.blends, pauses, fit, self.plan.reduced)
         if route.length < path_pieces.MIN_LENGTH:
             raise UsageError("the tool's way has no length: its points are all the same")
-        free = self.goal is not None
+        any_branch = self.goal is not None
         near = self.q if self.options.near is None else self.options.near
-        s, runs = self._runs(route, near, free=free)
-        for k, run in enumerate(runs):
-            fixed = self.q if not free and k == 0 and run.first == 0 and starts_at(run.chain, self.q) else None
+        s, runs = self._runs(route, near, any_branch=any_branch)
+        for number, run in enumerate(runs):
+            fixed = self.q if not any_branch and run.first == number == 0 and starts_at(run.chain, self.q) else None
             curves, misses = _timed_curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
-                self.append_joint_move(curves[0].start, self.leads if k == 0 else None)
+                self.append_joint_move(curves[0].start, self.leads if number == 0 else None)
             self.append_curves(add_detours(route, run.chain.windows), curves, order, misses)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
@@ -262,12 +262,12 @@ class Walk:
         self.goal = None
         self.pieces, self.blends, self.pauses = [], [], {}
 
-    def _runs(self, route: Route, near: Array, *, free: bool) -> tuple[Array, list[Run]]:
-        """A route's samples and the runs that carry it; the other branches, of many samples, are forgotten."""
-        branch = (self.goal_branch or self.options.branch) if free else None
+    def _runs(self, route: Route, near: Array, *, any_branch: bool) -> tuple[Array, list[Run]]:
+        """A route's samples and the runs that carry it; all other branches are dropped to free their memory."""
+        branch = (self.goal_branch or self.options.branch) if any_branch else None
         carried = carry_route(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
-            fixed=None if free else self.q, branch=branch, count=self.options.samples,
+            fixed=None if any_branch else self.q, branch=branch, count=self.options.samples
         )  # fmt: skip
         branch_report.note_runs(self.plan, carried, near)
         if not carried.in_one_run and not (self.options.split and carried.covered):
@@ -277,12 +277,12 @@ class Walk:
     def append_curves(
         self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed
     ) -> None:
-        """Put a run's curves into the plan, with the pauses where they begin; misses: of the given points."""
+        """Append a run's curves to the plan, with the events at their beginnings; misses: of the given points."""
         begins = {k: round(float(route.ends[number_of_curve[k]]), 6) for k in self.pauses if k in number_of_curve}
         events = {begin: self.pauses[k] for k, begin in begins.items()}
         for curve in curves:
-            path_ = joint_way(curve)
-            for kind, value in events.pop(round(float(path_.s[0]), 6), ()):
+            knots = joint_way(curve)
+            for kind, value in events.pop(round(float(knots.s[0]), 6), ()):
                 self.emit_event(kind, value)
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
@@ -291,11 +291,11 @@ class Walk:
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
-        bad = np.flatnonzero(outside_limits(self.arm, goal))
-        if len(bad):
-            raise NoSolutionError(f"{outside_text(self.arm, int(bad[0]), float(goal[bad[0]]))}: nothing was moved")
+        illegal = np.flatnonzero(outside_limits(self.arm, goal))
+        if len(illegal):
+            raise NoSolutionError(f"{outside_text(self.arm, int(illegal[0]), goal[illegal[0]])}: nothing was moved")
         speed = self.pace.speed * (1.0 if move is None or move.speed is None else move.speed / 100)
-        if self.opening:  # the path begins here, and what leads here is none of its moves
+        if self.opening:  # the path begins here: the move to this posture is its approach
             self.begun, self.opening = goal, False
         else:
             stretch = straight_move(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
@@ -306,16 +306,16 @@ class Walk:
 def _timed_curves(
     arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
 ) -> tuple[list[Curve | Smoothed], Missed]:
-    """A run in time, and what it misses of given points: a route fitted to them leaves it little tolerance."""
+    """A run as timed curves, and its miss of given points: where that is too large, a smaller tolerance is tried."""
     if not len(route.given_points[0]):
         return run_stretches(arm, route, s, run, near, pace, fixed=fixed), None
     for share in PLAN_SHARES:
-        tight = replace(pace, tolerance=share * pace.tolerance)
-        made = run_stretches(arm, route, s, run, near, tight, fixed=fixed)
-        misses = largest_miss(arm, route, joint_ways(made))
+        tight_pace = replace(pace, tolerance=share * pace.tolerance)
+        curves = run_stretches(arm, route, s, run, near, tight_pace, fixed=fixed)
+        misses = largest_miss(arm, route, joint_ways(curves))
         largest = 0.0 if misses is None else misses[0]
         if largest <= pace.tolerance:
-            return made, misses
+            return curves, misses
     raise NoSolutionError(
         f"a given point would lie {largest:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
         "tolerance, or fewer points at a time; nothing was moved",
@@ -334,42 +334,42 @@ def _note_deviation(plan: PathPlan, route: Route, path: Knots, misses: Missed) -
 
 
 def _nearest_posture(walk: Walk, goal: Spot, branch: str | None) -> Array:
-    """Joint values of a target: the branch within limits nearest to where the arm comes from, or the named."""
+    """Joint values (n,) of a target, within limits and nearest to the present ones; branch: its name, None: any."""
     return _postures(walk, goal, branch)[0]
 
 
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
-    """Joint values of a target on all branches within limits, or on the named one, the nearest first."""
+    """Joint values of a target on all branches within limits, or on the named one, sorted by distance."""
     target = path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0]
     solutions = ik(walk.arm, target, walk.task.name, near=walk.q)
     numbers = find_branches(solutions.names, branches) if (branches := branch or walk.options.branch) else None
-    free = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
-    good = solutions.valid & solutions.within_limits & (True if free is None else free)
-    named = [b for b in solutions.order if numbers is None or solutions.branch[b] in numbers]
-    postures = tuple(solutions.q[b] for b in named if good[b])
+    clear = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
+    allowed = solutions.valid & solutions.within_limits & (True if clear is None else clear)
+    candidates = [row for row in solutions.order if numbers is None or solutions.branch[row] in numbers]
+    postures = tuple(solutions.q[row] for row in candidates if allowed[row])
     if not postures:
-        raise _no_posture(solutions, goal, branches, free)
+        raise _no_posture(solutions, goal, branches, clear)
     return postures
 
 
-def _no_posture(solutions: Solutions, goal: Spot, branches: str | None, free: Bool | None) -> NoSolutionError:
-    """Why a target has none: it is out of reach, or of its `branches` none is free or within limits."""
+def _no_posture(solutions: Solutions, goal: Spot, branch_name: str | None, clear: Bool | None) -> NoSolutionError:
+    """The error of a target without a posture: out of reach, or every branch (of that name) hits or breaks a limit."""
     point = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
     if solutions.status == Status.UNREACHABLE:
         return NoSolutionError(f"{point} is out of reach: nothing was moved")
-    on_branch = f" on branch '{branches}'" if branches else ""
-    if free is not None and (solutions.within_limits & ~free).any():
+    on_branch = f" on branch '{branch_name}'" if branch_name else ""
+    if clear is not None and (solutions.within_limits & ~clear).any():
         return NoSolutionError(f"{point} has no solution{on_branch} that hits nothing: nothing was moved")
     return NoSolutionError(f"{point} has no solution within the limits{on_branch}: nothing was moved")
 
 
 def _copy_state(state: dict[str, Any]) -> dict[str, Any]:
-    """A state whose lists do not change with the original's."""
+    """A copy of a state in which lists are copied, too."""
     return {key: copy(v) if isinstance(v, list | dict | ReducedBlends) else v for key, v in state.items()}
 
 
 def _task_or_none(arm: Arm, file: PathFile, name: str | None) -> Task | None:
-    """What targets prescribe; None: no task fits the arm, and joint moves alone need none."""
+    """The task of a file's targets; None: no task fits the arm, and a file of joint moves needs none."""
     try:
         return task_for(arm, name)
     except UsageError:
@@ -380,7 +380,7 @@ def _task_or_none(arm: Arm, file: PathFile, name: str | None) -> Task | None:
 
 @contextmanager
 def _errors_of_key(file: PathFile, key: str) -> Iterator[None]:
-    """Errors inside are said of a key of the file, if it has that."""
+    """Name a key of the file as the place of errors raised inside, if the file has that key."""
     try:
         yield
     except (UsageError, NoSolutionError) as error:
@@ -391,7 +391,7 @@ def _errors_of_key(file: PathFile, key: str) -> Iterator[None]:
 
 @contextmanager
 def _errors_of_moves(walk: Walk) -> Iterator[None]:
-    """Errors inside are said of the moves that a walk does then."""
+    """Name the moves in progress as the place of errors raised inside."""
     try:
         yield
     except (UsageError, NoSolutionError) as error:

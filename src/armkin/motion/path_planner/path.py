@@ -86,6 +86,6 @@ def path(
     )
     check_rates(arm)
     file = path_numbers.as_path_file(arm, moves, task)
-    if (spare := redundancy(arm, task or file.task)) is not None and path_numbers.moves_tool(file):
-        return path_redundant(arm, file, spare, request)
+    if (redundant_joint := redundancy(arm, task or file.task)) is not None and path_numbers.moves_tool(file):
+        return path_redundant(arm, file, redundant_joint, request)
     return plan_path(arm, file, request)

@@ -1,4 +1,4 @@
-"""Where a path leads the tool: its routes, before a branch or a place of the arm is chosen."""
+"""The targets of a path's tool moves, computed before a branch or a place for the arm is chosen."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 
 def route_targets(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Array]]:
-    """The task, and the targets of every way that the tool goes on one branch, about `step` [mm] apart.
+    """The task, and the targets of every route that the tool follows on one branch, about `step` [mm] apart.
 
-    Between them are joint moves, which may change the branch; a point without a way has one target. Raises UsageError
-    for a way that begins where joint values leave the tool: it would move with the arm.
+    Joint moves between two routes may change the branch; a single point is a route of one target. Raises UsageError
+    for a route that begins at joint values, since its targets would move with the arm.
     """
     corner = default_corner_blend(file, None, None)
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
@@ -38,7 +38,7 @@ def route_targets(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Arr
 
 
 class _Outline(Walk):
-    """A walk that notes the routes and plans nothing."""
+    """A walk that records the targets of its routes and plans nothing."""
 
     step: float
     targets_per_route: list[Array]
@@ -50,15 +50,15 @@ class _Outline(Walk):
         self.begun = self.q
 
     def take_posture(self) -> None:
-        """Refused: there is no posture before the path is planned."""
+        """Raises UsageError: an outline has no posture."""
         raise UsageError("a way along the tool's axes hangs on the posture: give place offsets in the frame of targets")
 
     def _plan_group(self) -> None:
         if self.goal is not None:
             if self.pieces:
                 route, _ = join_pieces(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)
-                even = np.linspace(0.0, route.length, max(int(np.ceil(route.length / self.step)) + 1, 3))
-                s = np.union1d(even, route.breaks)
+                even_lengths = np.linspace(0.0, route.length, max(int(np.ceil(route.length / self.step)) + 1, 3))
+                s = np.union1d(even_lengths, route.breaks)
                 self.targets_per_route.append(route.targets(s))
             else:
                 self.targets_per_route.append(line(self.task, self.goal, self.goal).targets(np.zeros(1)))
@@ -70,5 +70,5 @@ class _Outline(Walk):
         self.pieces, self.blends, self.pauses = [], [], {}
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
-        """Note where a joint move ends."""
+        """Record the joint values at the end of a joint move."""
         self.q = goal

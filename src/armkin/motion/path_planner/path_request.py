@@ -1,4 +1,4 @@
-"""Moves of the tool and the joints as one plan in time, on the right branch, within all limits."""
+"""The arguments of `armkin.path`, checked and handed to the walk over its moves."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
-TOLERANCE = 0.05  # distance [mm] that the tool may be off its path
-HOLD_FACTOR = 1.5  # factor on max_accel during a hold
+TOLERANCE = 0.05  # greatest distance [mm] of the tool from its path
+HOLD_FACTOR = 1.5  # greatest acceleration during a hold, in multiples of max_accel
 
 
 @dataclass(frozen=True)
 class PathRequest:
-    """What `armkin.path` is asked for beside arm and moves: its docstring says what each is."""
+    """The keyword arguments of `armkin.path`, whose docstring explains each."""
 
     start: ArrayLike | None = None
     near: ArrayLike | None = None
@@ -47,37 +47,37 @@ class PathRequest:
     samples: int | None = None
 
     def start_joints(self, arm: Arm) -> Array:
-        """Where the arm stands: (n,) [rad | mm]."""
+        """Joint values at the start: (n,) [rad | mm], by default home."""
         return arm.home if self.start is None else np.asarray(self.start, dtype=float)
 
 
 def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
-    """`armkin.path` of an arm none of whose joints is redundant, and whose rates are checked: as that says."""
+    """`armkin.path` for an arm without a redundant joint, whose rates are checked already."""
     from armkin.path_file import check_robot
 
     check_robot(file, arm.name, arm.path)
     pace = _pace(arm, file, request)
     if pace.turn:
         wrist_turn.check_wrist(arm)
-    standing = request.start_joints(arm)
+    start = request.start_joints(arm)
     if arm.motors and not undriven_joints(arm):
-        standing = legal_with_same_pulses(arm, standing)
+        start = legal_with_same_pulses(arm, start)
     near = None if request.near is None else np.asarray(request.near, dtype=float)
-    wish = default_corner_blend(file, request.corners, request.blend)
-    options = PathOptions(request.task, wish, near, request.branch, request.split, request.samples)
-    return prove_plan(Walk(arm, file, pace, standing, options).plan_all(MOVES))
+    corner_blend = default_corner_blend(file, request.corners, request.blend)
+    options = PathOptions(request.task, corner_blend, near, request.branch, request.split, request.samples)
+    return prove_plan(Walk(arm, file, pace, start, options).plan_all(MOVES))
 
 
 def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
-    """How fast and how exactly a path is moved along. Raises UsageError for what is out of range."""
+    """The speed limits and tolerance of a path. Raises UsageError for a value out of range."""
     from armkin.path_file.path_keys import MIN_TOLERANCE, MIN_TOOL_SPEED
 
     check_share("speed", request.speed)
     check_share("accel", request.accel)
-    for name, least, unit in (("tool_speed", MIN_TOOL_SPEED, "mm/s"), ("tolerance", MIN_TOLERANCE, "mm")):
+    for name, minimum, unit in (("tool_speed", MIN_TOOL_SPEED, "mm/s"), ("tolerance", MIN_TOLERANCE, "mm")):
         value = getattr(request, name)
-        if value is not None and not least <= value < np.inf:
-            raise UsageError(f"{name} {value:g} is not possible; it is at least {least:g} {unit}")
+        if value is not None and not minimum <= value < np.inf:
+            raise UsageError(f"{name} {value:g} is not possible; it is at least {minimum:g} {unit}")
     return Pace(
         (file.speed or 100.0) / 100 * request.speed,
         request.accel,
@@ -90,18 +90,18 @@ def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
 
 
 def default_corner_blend(file: PathFile, corners: str | None, blend: float | None) -> float | Literal["default"] | None:
-    """The blend of corners without their own [mm], None: by the tolerance; "default": nothing is said of them."""
+    """The blend [mm] of corners without their own; None: the tolerance decides; "default": neither option is set."""
     if corners is not None and blend is not None:
         raise UsageError("corners and blend both say how corners are passed: give one of them")
     if blend is not None:
         return blend
-    wish = corners or file.corners
-    if wish == "blend" and file.blend is None:
+    choice = corners or file.corners
+    if choice == "blend" and file.blend is None:
         advice = "blend=5, or blend: 5 at the head of the file"
         raise UsageError("corners: blend needs a radius in mm", advice=advice, needs="blend")
     blends: dict[str | None, float | None] = {"stop": 0.0, "blend": file.blend, "tolerance": None}
-    if wish is None:
+    if choice is None:
         return "default" if file.blend is None else file.blend
-    if wish not in blends:
-        raise UsageError(f"corners '{wish}' is none of {', '.join(map(str, blends))}")
-    return blends[wish]
+    if choice not in blends:
+        raise UsageError(f"corners '{choice}' is none of {', '.join(map(str, blends))}")
+    return blends[choice]

@@ -1,4 +1,4 @@
-"""A planned path: its motion in time, and what was found about its branches."""
+"""The plan of a path: its motion in time and a report on its branches."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-_BLOCK_TIMES = 16_384  # times or grid points looked at together
+_BLOCK_TIMES = 16_384  # times or grid points evaluated in one call
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class PathRun:
 
     begin: float  # [mm]
     end: float
-    names: list[tuple[float, str]]  # where a branch's name begins, and the name
+    names: list[tuple[float, str]]  # length [mm] from which a branch name holds, and the name
     start_joints: Array
     end_joints: Array
 
@@ -45,14 +45,14 @@ class Reconfiguration:
     joint: str | None
     index: int | None
     value: float | None  # [rad | mm] the limit
-    beyond: str  # the inverse kinematics' status just behind
+    beyond: str  # status of the inverse kinematics just behind it
     hit: str = ""  # what hits what
     joints: Array | None = None  # (n,) [rad | mm] there
 
 
 @dataclass(frozen=True)
 class Passed:
-    """A wrist singularity that is passed straight through: the tool turned a little, or the tip aside."""
+    """A wrist singularity that the path passes: the tool turns aside a little, or the tip makes a detour."""
 
     begin: float  # [mm]
     end: float
@@ -62,7 +62,7 @@ class Passed:
 
 @dataclass(frozen=True)
 class Branch:
-    """A branch at the path's start: how far it carries, and why no farther."""
+    """A branch at the path's start, the length that it carries, and why it ends."""
 
     name: str
     start_joints: Array
@@ -161,18 +161,18 @@ class PathPlan:
                 index = i + candidates[k]
                 self.nearest_singularity = (self.length + float(s[index]), float(worst[k]), q[index].copy())
 
-    def set_motion(self, start: Array, made: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
+    def set_motion(self, start: Array, stretches: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """This plan with its motion from a posture on.
 
         Args:
             start: (n,) [rad | mm] where the motion begins.
-            made: its stretches, in order.
+            stretches: the motions between rests, in order.
             markers: what happens between them.
 
         Returns:
             This plan.
         """
-        self.trajectory, self.markers = Trajectory(self.arm, start, tuple(made)), markers
+        self.trajectory, self.markers = Trajectory(self.arm, start, tuple(stretches)), markers
         return self
 
     @property
@@ -228,15 +228,15 @@ class PathPlan:
         Returns:
             (...) [mm].
         """
-        when = np.asarray(t, dtype=float).ravel()
-        lengths = np.zeros(len(when))
+        times = np.asarray(t, dtype=float).ravel()
+        lengths = np.zeros(len(times))
         numbers = sorted(self.on_path)
         begins = self.motion.begins[numbers]
-        last = np.searchsorted(begins, when, side="right") - 1  # on the way, or behind it
+        last = np.searchsorted(begins, times, side="right") - 1  # the stretch at or before each time
         for i, rows in group_numbers(last):
             if i >= 0:
                 stretch, base = self._stretch(numbers[i])
-                lengths[rows] = base + stretch.lengths(when[rows] - begins[i])
+                lengths[rows] = base + stretch.lengths(times[rows] - begins[i])
         return lengths.reshape(np.shape(t))
 
     def s_range(self, number: int) -> tuple[float, float]:
@@ -272,8 +272,8 @@ class PathPlan:
     def _stretch(self, number: int) -> tuple[Curve | Smoothed, float]:
         """A stretch on the tool's way, and where it begins on it [mm]."""
         if number not in self.on_path:
-            there = ", ".join(map(str, sorted(self.on_path))) or "none"
-            raise UsageError(f"stretch {number} is not on the tool's way; on it are: {there}")
+            numbers = ", ".join(map(str, sorted(self.on_path))) or "none"
+            raise UsageError(f"stretch {number} is not on the tool's way; on it are: {numbers}")
         stretch, base = self.on_path[number]
         assert isinstance(stretch, Curve | Smoothed)
         return stretch, base
@@ -289,13 +289,13 @@ class PathPlan:
                 t = np.concatenate([stretch.times, stretch.times[1:] * (1 - 1e-12)])
             else:
                 t = np.linspace(0.0, stretch.duration, 200)
-            for k in range(0, len(t) - 1, _BLOCK_TIMES):  # neighbouring blocks share a time: a jerk is between two
-                part = t[k : k + _BLOCK_TIMES + 1]
-                a = stretch.evaluate(part, 2)
+            for i in range(0, len(t) - 1, _BLOCK_TIMES):  # blocks share a time, since jerk is a difference
+                part = t[i : i + _BLOCK_TIMES + 1]
+                acceleration = stretch.evaluate(part, 2)
                 speed = np.maximum(speed, np.abs(stretch.evaluate(part, 1)).max(axis=0))
-                accel = np.maximum(accel, np.abs(a).max(axis=0))
+                accel = np.maximum(accel, np.abs(acceleration).max(axis=0))
                 if isinstance(stretch, Smoothed):
-                    jerk = np.maximum(jerk, np.abs(np.diff(a, axis=0)).max(axis=0) / (t[1] - t[0]))
+                    jerk = np.maximum(jerk, np.abs(np.diff(acceleration, axis=0)).max(axis=0) / (t[1] - t[0]))
         shares = {"speed": speed / self.arm.max_speed, "accel": accel / self.arm.max_accel}
         if np.isfinite(self.arm.max_jerk).all() and jerk.any():
             shares["jerk"] = jerk / self.arm.max_jerk
@@ -303,10 +303,11 @@ class PathPlan:
 
 
 def _worst_conditioned(arm: Arm, q: Array) -> NDArray[np.intp]:
-    """Which of the joint values (N, n) may have the greatest condition number: of three joints few of them.
+    """The rows of joint values (N, n) that may have the greatest condition number; for three joints these are few.
 
     The squares of three singular values are the eigenvalues of J J', in closed form (Smith, Eigenvalues of a symmetric
-    3 x 3 matrix, 1961), to half of the digits: what is near the greatest, or too great to tell, is looked at again.
+    3 x 3 matrix, 1961), accurate to half of the digits. Rows near the greatest value, or beyond that
+    accuracy, are the candidates for an exact condition number.
     """
     if arm.n != 3:
         return np.arange(len(q))

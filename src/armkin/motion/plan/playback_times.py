@@ -1,4 +1,4 @@
-"""Where a plan is looked at so that what is drawn between these times lies near the motion, however many there are."""
+"""Sample times of a plan for playback, dense enough that a drawing interpolated between them is accurate."""
 
 from __future__ import annotations
 
@@ -13,30 +13,30 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-_MAX_FIRST_STEP = 0.5  # time [s], at most, between two of the first samples
-_INNER_PARAMETERS = (0.21, 0.5, 0.79)  # parameters between two samples at which the motion is looked at
+_MAX_FIRST_STEP = 0.5  # largest step [s] of the first samples
+_INNER_PARAMETERS = (0.21, 0.5, 0.79)  # parameters between two samples at which the error is measured
 
 
-def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, most: int) -> tuple[Array, float]:
-    """Times [s] between which the tip drawn is off by `close` [mm] at most, or by what `most` of them leave; how much.
+def sample_times(arm: Arm, plan: PathPlan, begins: list[float], accuracy: float, max_count: int) -> tuple[Array, float]:
+    """At most `max_count` times [s] for drawing a plan to within `accuracy` [mm], and the greatest error left [mm].
 
-    Where they may be too few, those intervals are divided first that leave the most.
-    Drawn: joints that go evenly between two times, and the tip's way as its chord. begins: times that are among them.
+    Drawings interpolate joint values linearly between two times, and draw the tip's path as a chord. The intervals with
+    the largest errors are divided first. begins: times that must be among the result.
     """
-    count = int(min(most / 4, plan.duration / _MAX_FIRST_STEP)) + 2
+    count = int(min(max_count / 4, plan.duration / _MAX_FIRST_STEP)) + 2
     t = np.unique(np.concatenate([np.linspace(0.0, plan.duration, count), begins]))
     a, b = t[:-1], t[1:]  # intervals that may be divided
     errors = _drawn_error(arm, plan, a, b)
     parts = [t]
-    worst, room = 0.0, most - len(t)
+    worst, room = 0.0, max_count - len(t)
     while True:
-        bad = (errors > close) & (b - a > 1e-3)
-        worst = max(worst, float(errors[~bad].max(initial=0.0)))
-        a, b, errors = a[bad], b[bad], errors[bad]
+        too_far = (errors > accuracy) & (b - a > 1e-3)
+        worst = max(worst, float(errors[~too_far].max(initial=0.0)))
+        a, b, errors = a[too_far], b[too_far], errors[too_far]
         if not len(a) or room <= 0:
             break
         order = np.argsort(-errors, kind="stable")[:room]
-        if 4 * len(order) > room:  # the others wait: they may be the least of what is left
+        if 4 * len(order) > room:  # divide only the worst ones while there is little room
             order = order[errors[order] > 0.5 * errors[order[0]]]
         middle = (a[order] + b[order]) / 2
         parts.append(middle)
@@ -48,7 +48,7 @@ def sample_times(arm: Arm, plan: PathPlan, begins: list[float], close: float, mo
 
 
 def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
-    """How far the tip drawn is from the tip [mm], the most seen between the times a and b: (k,)."""
+    """The greatest distance of the drawn tip from the tip [mm] between the times a and b: (k,)."""
     first, last = plan.q(a), plan.q(b)
     tips = [position(arm, first), position(arm, last)]
     errors = np.zeros(len(a))
@@ -56,9 +56,9 @@ def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:
         true_tip = position(arm, plan.q(a + share * (b - a)))
         joint_tip = position(arm, first + share * (last - first))
         errors = np.maximum(errors, np.linalg.norm(joint_tip - true_tip, axis=1))
-        # The way that is drawn: the distance to the chord.
-        way = tips[1] - tips[0]
-        long = np.maximum((way * way).sum(axis=1, keepdims=True), 1e-12)
-        along = np.clip(((true_tip - tips[0]) * way).sum(axis=1, keepdims=True) / long, 0.0, 1.0)
-        errors = np.maximum(errors, np.linalg.norm(true_tip - tips[0] - along * way, axis=1))
+        # The error of the drawn path is the distance to its chord.
+        chord = tips[1] - tips[0]
+        square = np.maximum((chord * chord).sum(axis=1, keepdims=True), 1e-12)
+        fraction = np.clip(((true_tip - tips[0]) * chord).sum(axis=1, keepdims=True) / square, 0.0, 1.0)
+        errors = np.maximum(errors, np.linalg.norm(true_tip - tips[0] - fraction * chord, axis=1))
     return np.asarray(errors)

@@ -1,4 +1,4 @@
-"""Motions that hit nothing: a trajectory's geometry, the proof that it is free, and why it is not."""
+"""The proof that a trajectory hits nothing, and the error for one that does."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class TrajectoryProof:
-    """What a proof has found of a trajectory.
+    """The result of a proof: the first hit of a trajectory, or its place of least clearance.
 
-    proof: of the part with the first hit, or with the least clearance; stretch: its number there, share: how far into
-    that stretch's cells; joints: (n,) [rad | mm] there; body, keep_out: names of the pair, empty where nothing counts;
-    escaping: pairs that were too near at the start.
+    mm: the clearance; stretch, cell: the place, as number of the stretch and position in its cells; joints: (n,)
+    [rad | mm] there; body, keep_out: names of the pair, empty if there is none; escaping: pairs that were too near
+    each other at the start; postures: how many were tested.
     """
 
     free: bool
@@ -51,7 +51,7 @@ class TrajectoryProof:
 
 
 class _SmoothedWay:
-    """A smoothed curve as a way in time, one cell a grid interval of the curve."""
+    """A smoothed curve as the geometry of a motion, its cells as long as the grid intervals of the curve."""
 
     def __init__(self, smoothed: Smoothed) -> None:
         self.smoothed, self.curve = smoothed, smoothed.curve
@@ -68,24 +68,24 @@ class _SmoothedWay:
         return self.smoothed.evaluate(self._time(place))
 
     def variation(self, begin: Array, end: Array) -> Array:
-        """The mean over a window goes no farther than the curve does within the windows that it sees.
+        """A bound of how far each joint of the moving average goes between two places.
 
-        Its speed is what the curve moves within the window, by the window; so between two times it goes at most
-        the share dt / window of the curve's way from the earlier window's begin to the later one's end.
+        The speed of the average is the curve's travel within the window, divided by the window. Between two times it
+        goes at most the share dt / window of the curve's travel from the first window's begin to the last one's end.
         """
         t0, t1 = self._time(begin), self._time(end)
-        after = np.searchsorted(self.curve.times, t1, side="left")
-        before = np.searchsorted(self.curve.times, t0 - self.smoothed.window, side="right") - 1
+        end_index = np.searchsorted(self.curve.times, t1, side="left")
+        begin_index = np.searchsorted(self.curve.times, t0 - self.smoothed.window, side="right") - 1
         last = len(self.curve.times) - 1
-        way = self._sums[np.clip(after, 0, last)] - self._sums[np.clip(before, 0, last)]
-        return np.asarray(np.minimum((t1 - t0) / self.smoothed.window, 1.0)[:, None] * way)
+        travel = self._sums[np.clip(end_index, 0, last)] - self._sums[np.clip(begin_index, 0, last)]
+        return np.asarray(np.minimum((t1 - t0) / self.smoothed.window, 1.0)[:, None] * travel)
 
     def _time(self, place: Array) -> Array:
         return np.minimum(place / self.cells, 1.0) * self.smoothed.duration
 
 
 def _control_points(stretch: Stretch) -> Array:
-    """Control points (4, cells, n) of a stretch that is no mean."""
+    """Control points (4, cells, n) of a straight line or a curve."""
     if isinstance(stretch, Curve):
         q, h = stretch.path.q, stretch.path.h[:, None]
         d = stretch.path.d
@@ -95,7 +95,7 @@ def _control_points(stretch: Stretch) -> Array:
 
 
 def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> TrajectoryProof | None:
-    """What a proof finds of a trajectory; None for an arm without keep-outs. tight: see `prove_motion`."""
+    """Prove that a trajectory hits nothing; None for an arm without keep-outs. tight: see `prove_motion`."""
     arm = trajectory.arm
     full_arm, _ = whole_arm(arm, trajectory.start[None])
     if not full_arm.keep_out:
@@ -105,27 +105,27 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Trajecto
     bodies, postures = guard(full_arm), 0
     allowed, nearest = None, None
     escaping: tuple[int, ...] = ()
-    for first, way in _geometries(trajectory):
-        full_way = _UnlockedWay(arm, way)
-        proof = prove_motion(bodies, full_way, tight=tight, ignored_pairs=allowed)
+    for first, geometry in _geometries(trajectory):
+        full_geometry = _UnlockedWay(arm, geometry)
+        proof = prove_motion(bodies, full_geometry, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
             escaping = proof.escaping
         allowed = proof.escaping
-        found_proof = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, way)
+        part_proof = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, geometry)
         if not proof.free:
-            return found_proof
-        if nearest is None or found_proof.mm < nearest.mm:
-            nearest = found_proof
+            return part_proof
+        if nearest is None or part_proof.mm < nearest.mm:
+            nearest = part_proof
     if nearest is None:  # no stretch: the arm stays where it is
         return None
     return TrajectoryProof(**{**vars(nearest), "postures": postures})
 
 
 def check_free(trajectory: Trajectory, place: str = "") -> None:
-    """Raise NoSolutionError, naming body, obstacle and place, if a motion is not proved free of what it must not touch.
+    """Raise NoSolutionError, naming body, obstacle and place, if a motion is not proved free of hits.
 
-    Costs nothing for an arm without keep-outs, or one that ignores them.
+    Arms without keep-outs, and those that ignore them, are not tested.
     """
     if trajectory.arm.keep_out and not trajectory.arm.ignores_keep_out:
         proof = prove_trajectory(trajectory)
@@ -154,13 +154,13 @@ def prove_plan(plan: PathPlan) -> PathPlan:
 
 
 def hit_refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", **fields: object) -> NoSolutionError:
-    """Why a motion is refused; place: where on a path."""
+    """The error of a motion that hits something; place: words for where on a path."""
     arm = trajectory.arm
     values = units.joints_out(arm, hit.joints).tolist()
     joints_text = ", ".join(f"{name} = {value:.4g}" for name, value in zip(arm.joint_names, values, strict=True))
-    stands = (hit.body, hit.keep_out) in hit.escaping
+    escapes = (hit.body, hit.keep_out) in hit.escaping
     way_text = f" on the way to waypoint {hit.stretch + 1}" if len(trajectory.stretches) > 1 and not place else ""
-    verb = "would go deeper into" if stands else "would hit"
+    verb = "would go deeper into" if escapes else "would hit"
     details = {"body": hit.body, "with": hit.keep_out, "joints": values, **fields}
     return NoSolutionError(
         f"{hit.body} {verb} {hit.keep_out}{place or way_text}, at {joints_text}: nothing was moved", **details
@@ -168,18 +168,18 @@ def hit_refusal(trajectory: Trajectory, hit: TrajectoryProof, place: str = "", *
 
 
 def free_way(arm: Arm, q: Array, goal: Array) -> tuple[float, NoSolutionError | None]:
-    """How far a straight line in joint space from q to goal, (n,), is proved free, 0 to 1; and why no farther."""
+    """The fraction, 0 to 1, of a joint line from q to goal, (n,), that is proved free, and the error behind it."""
     if not arm.keep_out or arm.ignores_keep_out or np.array_equal(q, goal):
         return 1.0, None
-    way = Trajectory(arm, q, (Straight(q, goal, trapezoid(1.0, 1.0, 1.0)),))
-    proof = prove_trajectory(way)
+    trajectory = Trajectory(arm, q, (Straight(q, goal, trapezoid(1.0, 1.0, 1.0)),))
+    proof = prove_trajectory(trajectory)
     if proof is None or proof.free:
         return 1.0, None
-    return proof.cell, hit_refusal(way, proof)
+    return proof.cell, hit_refusal(trajectory, proof)
 
 
 def hit_samples(arm: Arm, q: Array) -> NDArray[np.bool_] | None:
-    """Which of neighbouring postures (N, n) hit something; None for an arm that need not look."""
+    """Which of neighbouring postures (N, n) hit something; None for an arm without keep-outs or that ignores them."""
     if not arm.keep_out or arm.ignores_keep_out:
         return None
     from armkin.keep_out.body_pairs import guard
@@ -196,7 +196,7 @@ def hit_text(arm: Arm, q: Array) -> str:
 
 @dataclass(frozen=True)
 class _UnlockedWay:
-    """The way of the whole arm, where joints are held."""
+    """The geometry of a motion in the joints of the whole arm, with the held ones at rest."""
 
     arm: Arm
     way: Way
@@ -212,21 +212,21 @@ class _UnlockedWay:
 
     def variation(self, begin: Array, end: Array) -> Array:
         """How far each joint of the whole arm goes between two places."""
-        arm, way = self.arm, self.way.variation(begin, end)
+        arm, travel = self.arm, self.way.variation(begin, end)
         while arm.whole is not None:
             arm, held = arm.whole
-            way = unlock(arm, dict.fromkeys(held, 0.0), way)
-        return way
+            travel = unlock(arm, dict.fromkeys(held, 0.0), travel)
+        return travel
 
 
 def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
-    """The stretches' geometry, those that are cubics together; and the number of the first stretch of each."""
+    """The geometry of the stretches, consecutive cubics as one; each with the number of its first stretch."""
     geometries: list[tuple[int, Way]] = []
     numbered = enumerate(trajectory.stretches)
     for smooth, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
         part = list(group)
         if smooth:
-            geometries += [(k, _SmoothedWay(stretch)) for k, stretch in part if isinstance(stretch, Smoothed)]
+            geometries += [(number, _SmoothedWay(stretch)) for number, stretch in part if isinstance(stretch, Smoothed)]
         else:
             geometries.append(
                 (part[0][0], Cubics(np.concatenate([_control_points(stretch) for _, stretch in part], axis=1)))
@@ -237,7 +237,7 @@ def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
 def _proof_on_trajectory(
     trajectory: Trajectory, held: Guard, first: int, proof: Proof, escaping: tuple[int, ...], postures: int, way: Way
 ) -> TrajectoryProof:
-    """A proof in the terms of the trajectory."""
+    """Convert a proof of a part to stretches, joint values and names of the trajectory."""
     stretch, cell = first, proof.place
     if isinstance(way, Cubics):
         sizes = [_cell_count(later) for later in trajectory.stretches[first:]]
@@ -270,14 +270,14 @@ def hit_time(trajectory: Trajectory, hit: TrajectoryProof) -> float:
 
 
 def _time_of_share(stretch: Stretch, share: float) -> float:
-    """When a straight line has gone so far: its law never goes back."""
+    """The time at which a straight line has covered a share of its length, by bisection."""
     low, high = 0.0, stretch.duration
-    way = stretch.end - stretch.start
-    j = int(np.argmax(np.abs(way)))
-    if way[j] == 0.0:
+    change = stretch.end - stretch.start
+    joint = int(np.argmax(np.abs(change)))
+    if change[joint] == 0.0:
         return 0.0
     for _ in range(50):
         middle = (low + high) / 2
-        gone = float((stretch.evaluate(np.array([middle]))[0, j] - stretch.start[j]) / way[j])
-        low, high = (middle, high) if gone < share else (low, middle)
+        covered = float((stretch.evaluate(np.array([middle]))[0, joint] - stretch.start[joint]) / change[joint])
+        low, high = (middle, high) if covered < share else (low, middle)
     return low

@@ -1,4 +1,4 @@
-"""A way through joint space as cubics between grid points."""
+"""A path through joint space as cubics between grid points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Int
 class Knots:
     """A joint path as cubics between grid points: q, q' at the points, and q'' at both ends of every interval.
 
-    Where a path rests in a corner the point stands twice, with the slopes before and behind it: an interval of no way.
+    A corner where the path rests is two knots with the same s, one for the slope on each side.
     """
 
     s: Array  # (N,)
@@ -23,7 +23,7 @@ class Knots:
 
     @cached_property
     def h(self) -> Array:
-        """Lengths of the intervals: (N - 1,); 1 where the path rests, whatever is divided by it."""
+        """Lengths of the intervals: (N - 1,); 1 where the path rests, so that divisions stay finite."""
         h = self.s[1:] - self.s[:-1]
         return np.asarray(np.where(h == 0.0, 1.0, h))
 
@@ -47,7 +47,7 @@ class Knots:
         return left.T, right.T
 
     def slopes(self, intervals: slice | Int = slice(None)) -> tuple[Array, Array, Array]:
-        """q' at the left end of intervals, q'' there and at the right end: (n, M) thrice, long runs of numbers."""
+        """q' at the left end of intervals, q'' at the left and at the right end: (n, M) each."""
         (q0, q1), (d0, d1) = (self.ends(values, intervals) for values in (self.q, self.d))
         h = self.h[intervals]
         chord = (q1 - q0) / h
@@ -55,7 +55,7 @@ class Knots:
 
     @staticmethod
     def ends(values: Array, intervals: slice | Int) -> tuple[Array, Array]:
-        """Values at both ends of intervals, (n, M) twice, of those at the points (N, n)."""
+        """From values at the points (N, n), those at both ends of intervals: (n, M) twice."""
         columns = values.T
         if isinstance(intervals, slice):
             return columns[:, :-1][:, intervals], columns[:, 1:][:, intervals]

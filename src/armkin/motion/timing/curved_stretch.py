@@ -1,4 +1,4 @@
-"""A curved way through joint space with a law of time."""
+"""A curved path through joint space with its time law."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Curve:
 
     @cached_property
     def times(self) -> Array:
-        """When every grid point is passed: (N,) [s]."""
+        """The time at every grid point: (N,) [s]."""
         root = np.sqrt(self.x)
         step = 2 * self.path.h / np.maximum(root[:-1] + root[1:], 1e-300)
         return np.concatenate([[0.0], np.cumsum(step)])
@@ -59,22 +59,22 @@ class Curve:
         return np.asarray(np.abs(self.path.d * np.sqrt(self.x)[:, None]).max(axis=0))
 
     def locate(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
-        """Interval, way into it, ds/dt and d2s/dt2 at times t: (T,) each."""
-        when = np.clip(t, 0.0, self.duration)
-        i = np.clip(np.searchsorted(self.times, when, side="right") - 1, 0, len(self._u) - 1)
-        tau = when - self.times[i]
+        """The interval, the length into it, ds/dt and d2s/dt2 at times t: (T,) each."""
+        times = np.clip(t, 0.0, self.duration)
+        i = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self._u) - 1)
+        tau = times - self.times[i]
         v, u = np.sqrt(self.x[i]), self._u[i]
         return i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u
 
     def lengths(self, t: Array) -> Array:
         """s at times t: (T,) -> (T,)."""
-        i, along, _, _ = self.locate(t)
-        return np.asarray(self.path.s[i] + along)
+        i, offset, _, _ = self.locate(t)
+        return np.asarray(self.path.s[i] + offset)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
-        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
-        i, along, v, u = self.locate(np.asarray(t, dtype=float))
-        w, c2, c3 = along[:, None], *(part.take(i, axis=0) for part in self._bends)
+        """Joint values, or their first or second derivative, at times t [s] since its beginning: (T,) -> (T, n)."""
+        i, offset, v, u = self.locate(np.asarray(t, dtype=float))
+        w, c2, c3 = offset[:, None], *(part.take(i, axis=0) for part in self._bends)
         d0 = self.path.d.take(i, axis=0)
         if derivative == 0:
             return np.asarray(self.path.q.take(i, axis=0) + w * (d0 + w * (c2 + w * c3)))

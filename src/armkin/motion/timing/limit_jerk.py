@@ -1,6 +1,6 @@
-"""Where the jerk of a path is limited: its curve in time, made smooth by a moving average.
+"""Limits the jerk of a path: a moving average smooths its curve in time.
 
-Moves from pose to pose have theirs from `profile.py`.
+Joint moves are limited in jerk by the seven phases of `profile.py` instead.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ _W = np.array([0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.
 
 
 def smoothing_window(accel: Array, jerk: ArrayLike) -> float:
-    """Seconds over which a curve's mean has at most that jerk: (n,) [rad/s2 | mm/s2], (n,) [rad/s3 | mm/s3]."""
+    """The window [s] whose moving average limits the jerk: accel (n,) [rad/s2 | mm/s2], jerk (n,) [rad/s3 | mm/s3]."""
     return float((2 * accel / np.asarray(jerk, dtype=float)).max())
 
 
 @dataclass(frozen=True)
 class Smoothed:
-    """A curve's mean over the last `window` seconds: bounded jerk, no more speed, no more acceleration.
+    """The moving average of a curve over the last `window` seconds, whose jerk is bounded.
 
-    q(t) is the integral of the curve over [t - window, t], by the window. Its jerk is at most twice the curve's
-    acceleration by the window; it takes exactly the window longer.
+    q(t) is the integral of the curve over [t - window, t], divided by the window. Its speed and acceleration are at
+    most the curve's, its jerk is at most twice the curve's acceleration divided by the window, and it takes exactly the
+    window longer.
     """
 
     curve: Curve
@@ -74,36 +75,36 @@ class Smoothed:
     def _integral(self, t: Array) -> Array:
         """Integral of q - start from 0 to t, at rest before and after: (T, n)."""
         curve = self.curve
-        inside = np.clip(t, 0.0, curve.duration)
-        i = np.clip(np.searchsorted(curve.times, inside, side="right") - 1, 0, len(curve.times) - 2)
-        step = inside - curve.times[i]
+        times = np.clip(t, 0.0, curve.duration)
+        i = np.clip(np.searchsorted(curve.times, times, side="right") - 1, 0, len(curve.times) - 2)
+        step = times - curve.times[i]
         nodes = curve.times[i][:, None] + step[:, None] * _X
         q = curve.evaluate(nodes.ravel()).reshape(*nodes.shape, -1) - self.start
-        part = (q * _W[:, None]).sum(axis=1) * step[:, None]
-        beyond = np.maximum(t - curve.duration, 0.0)[:, None] * (self.end - self.start)
-        return np.asarray(self._sums[i] + part + beyond)
+        last_part = (q * _W[:, None]).sum(axis=1) * step[:, None]
+        rest_part = np.maximum(t - curve.duration, 0.0)[:, None] * (self.end - self.start)
+        return np.asarray(self._sums[i] + last_part + rest_part)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
-        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
+        """Joint values, or their first or second derivative, at times t [s] since its beginning: (T,) -> (T, n)."""
         end = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
         begin = end - self.window
         if derivative == 0:
             return np.asarray(self.start + (self._integral(end) - self._integral(begin)) / self.window)
         change = self.curve.evaluate(end, derivative - 1) - self.curve.evaluate(begin, derivative - 1)
-        if derivative == 2:  # speeds before and after the curve are 0, whatever the clipped ends say
+        if derivative == 2:  # the curve is at rest outside its duration, where evaluate clips to its ends
             inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (end, begin)]
             change = self.curve.evaluate(end, 1) * inside[0] - self.curve.evaluate(begin, 1) * inside[1]
         return np.asarray(change / self.window)
 
 
 def joint_way(stretch: Curve | Smoothed) -> Knots:
-    """The way through joint space of a curve, or of the one that was made smooth."""
+    """The joint path of a curve, or of the curve that was smoothed."""
     return stretch.path if isinstance(stretch, Curve) else stretch.curve.path
 
 
 def joint_ways(stretches: Sequence[Curve | Smoothed]) -> Knots:
-    """The ways of stretches one after another as one, with a rest between each two."""
-    ways = [joint_way(stretch) for stretch in stretches]
-    if len(ways) == 1:
-        return ways[0]
-    return Knots(*(np.concatenate([getattr(way, part) for way in ways]) for part in ("s", "q", "d")))
+    """The joint paths of stretches in order as one, with a rest between each two."""
+    paths = [joint_way(stretch) for stretch in stretches]
+    if len(paths) == 1:
+        return paths[0]
+    return Knots(*(np.concatenate([getattr(path, part) for path in paths]) for part in ("s", "q", "d")))

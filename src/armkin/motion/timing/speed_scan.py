@@ -1,4 +1,4 @@
-"""Scans along a path: from each grid point to the next one comes as far as the least of some affine functions says."""
+"""Scans along a path: y at the next grid point is the least of some affine functions of y at this one."""
 
 from __future__ import annotations
 
@@ -8,29 +8,29 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Int
 
-_MIN_INTERVALS, _MAX_INTERVALS = 8, 4096  # intervals followed one by one before it is asked if that can end
-_MANY_RUNS = 32  # runs beyond which they go side by side
-_MAX_STEPS = 64  # steps of runs side by side while there are few of them
-_MAX_ROUNDS = 8  # rounds after which runs go one by one in any case
+_MIN_INTERVALS, _MAX_INTERVALS = 8, 4096  # intervals scanned one by one between two checks for the end
+_MANY_RUNS = 32  # with more runs than this they are scanned side by side
+_MAX_STEPS = 64  # steps side by side after which few runs are scanned one by one
+_MAX_ROUNDS = 8  # rounds after which runs are scanned one by one
 
 
 class Least(NamedTuple):
     """The least of affine functions a y + b for y from 0 to some greatest, in every interval.
 
-    Of the many rows of an interval only a few are the least anywhere: that at y = 0, that at the greatest y, and of
-    the others at most those that are lower where these two cross.
+    Of the many functions of an interval only few are the least anywhere: the least one at y = 0, the least one at the
+    greatest y, and at most those that lie below the crossing of these two.
     """
 
     a0: Array  # (M,)
     b0: Array
     a1: Array
     b1: Array
-    interval: Int  # (E,) intervals of the others, ascending
+    interval: Int  # (E,) interval of each further function, ascending
     slope: Array  # (E,)
     level: Array
 
     def values(self, y: Array) -> Array:
-        """What every interval says of y: (M,) -> (M,)."""
+        """The least value of every interval's functions at y: (M,) -> (M,)."""
         lowest = np.minimum(self.a0 * y + self.b0, self.a1 * y + self.b1)
         np.minimum.at(lowest, self.interval, self.slope * y[self.interval] + self.level)
         return lowest
@@ -43,11 +43,11 @@ class Least(NamedTuple):
 
     def replace_intervals(self, intervals: Int, functions: Least) -> Least:
         """The least functions with others in some intervals (k,), ascending; a0 to b1 change in place."""
-        for own, values in zip(self[:4], functions[:4], strict=True):
-            own[intervals] = values
-        fresh = np.zeros(len(self.a0), bool)
-        fresh[intervals] = True
-        unchanged = ~fresh[self.interval]
+        for array, values in zip(self[:4], functions[:4], strict=True):
+            array[intervals] = values
+        replaced = np.zeros(len(self.a0), bool)
+        replaced[intervals] = True
+        unchanged = ~replaced[self.interval]
         intervals_after = np.concatenate([self.interval[unchanged], intervals[functions.interval]])
         order = np.argsort(intervals_after, kind="stable")
         slope, level = (np.concatenate([a[unchanged], b])[order] for a, b in zip(self[5:], functions[5:], strict=True))
@@ -61,10 +61,10 @@ def least_of(a: Array, b: Array, top: Array) -> Least:
     a0, b0 = a[first, i], b[first, i]
     a1, b1 = a[last, i], b[last, i]
     y = np.minimum(np.maximum((b1 - b0) / (a0 - a1), 0.0), top)
-    two = ((first != last) & (y >= 0.0)).nonzero()[0]
-    a, b, y = a.take(two, axis=1), b.take(two, axis=1), y[two]
-    k, j = np.nonzero((a * y + b < (a0[two] * y + b0[two]) * (1 - 1e-12)).T)
-    return Least(a0, b0, a1, b1, two[k], a[j, k], b[j, k])
+    crossing = ((first != last) & (y >= 0.0)).nonzero()[0]
+    a, b, y = a.take(crossing, axis=1), b.take(crossing, axis=1), y[crossing]
+    column, row = np.nonzero((a * y + b < (a0[crossing] * y + b0[crossing]) * (1 - 1e-12)).T)
+    return Least(a0, b0, a1, b1, crossing[column], a[row, column], b[row, column])
 
 
 def concatenate_least(parts: list[Least]) -> Least:
@@ -78,12 +78,12 @@ def concatenate_least(parts: list[Least]) -> Least:
 
 
 def forward_step(h: Array, slope: Array, level: Array) -> tuple[Array, Array]:
-    """`keep` and `gain` of every row: from x[i] one comes to keep x[i] + gain at most, and the least of all counts."""
+    """`keep` and `gain` of every row: x[i+1] is at most keep x[i] + gain, for the least of all rows."""
     return 1.0 - 2 * h * slope, 2 * h * level
 
 
 def backward_step(keep: Array, gain: Array) -> tuple[Array, Array]:
-    """Rows e and f from the end of the path: x[i+1] is reached from e x[i+1] + f at most; last interval first."""
+    """Rows e and f from the end of the path: x[i] is at most e x[i+1] + f; the last interval comes first."""
     e = np.where(keep > 0, 1.0 / keep, 0.0)
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 
@@ -91,9 +91,8 @@ def backward_step(keep: Array, gain: Array) -> tuple[Array, Array]:
 def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     """y[0] = top[0], y[i+1] = min(top[i+1], least_i(y[i])), not below 0.
 
-    previous: such a y of another top and least, which differ in some intervals. Where y is what comes there from the y
-    before it, nothing has to be done: in most intervals. Runs that begin where it is not are followed side by side,
-    as long as there are many.
+    previous: the y of another top and least that differ in some intervals. Most intervals are still consistent: y[i+1]
+    follows from y[i]. Runs are scanned from the others on, side by side as long as there are many.
     """
     y = (top if previous is None else previous).copy()
     y[0] = top[0]
@@ -101,20 +100,20 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     first = np.append(0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1)))
     for _ in range(_MAX_ROUNDS):
         reached = least.values(y[:-1])
-        k = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]
-        heads = k[np.diff(k, prepend=-2) > 1]  # the run of a first one passes those next to it
+        changed = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]
+        heads = changed[np.diff(changed, prepend=-2) > 1]  # a run passes the intervals right behind its head
         if len(heads) <= _MANY_RUNS:
             break
         _follow_runs(y, least, first, heads, top)
     end = 0
-    for begin in k.tolist():
+    for begin in changed.tolist():
         if begin >= end:
             end = _follow_run(y, least, first, begin, top)
     return y
 
 
 def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
-    """Follow runs from places (r,), each up to where y is what comes there; write those that no other one passes."""
+    """Scan runs from their heads (r,) until they meet y, and write those that no earlier run has passed."""
     k, current = heads, y[heads]
     run, end = np.arange(len(heads)), len(y) - 1
     ends = np.full(len(heads), end)
@@ -135,7 +134,7 @@ def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> 
         steps.append((run, k, current))
         inside = k < end
         k, current, run = k[inside], current[inside], run[inside]
-        if len(steps) > _MAX_STEPS and len(k) <= _MANY_RUNS:  # these are followed one by one
+        if len(steps) > _MAX_STEPS and len(k) <= _MANY_RUNS:  # the others are scanned one by one
             ends[run] = k
             break
     end_of_last, written = 0, np.zeros(len(heads), bool)
@@ -148,19 +147,19 @@ def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> 
 
 
 def _functions_by_interval(least: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
-    """Some of the other functions, by the intervals that have them."""
+    """The further functions of some intervals, by interval."""
     functions: dict[int, list[tuple[float, float]]] = {}
     for interval, slope, level in zip(*(column[intervals].tolist() for column in least[4:]), strict=True):
         functions.setdefault(interval, []).append((slope, level))
     return functions
 
 
-def _follow_run(y: Array, least: Least, first: Int, k: int, most: Array) -> int:
-    """Put right y[k+1], ... up to some place where it is what comes there, and return that."""
+def _follow_run(y: Array, least: Least, first: Int, k: int, caps: Array) -> int:
+    """Update y[k+1], ... until a value is unchanged, and return its index."""
     current, size = float(y[k]), _MIN_INTERVALS
     while True:
         end = min(k + size, len(y) - 1)
-        tops, last, values = most[k + 1 : end + 1].tolist(), y[end], []
+        tops, last, values = caps[k + 1 : end + 1].tolist(), y[end], []
         rows = (column[k:end].tolist() for column in least[:4])
         functions = _functions_by_interval(least, slice(first[k], first[end]))
         for i, top, a0, b0, a1, b1 in zip(range(k, end), tops, *rows, strict=True):

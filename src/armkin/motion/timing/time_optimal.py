@@ -1,17 +1,16 @@
-"""The fastest law of time along a joint path, within speeds and accelerations of joints and motors.
+"""The fastest time law along a joint path, within the speeds and accelerations of joints and motors.
 
 With x = (ds/dt)^2 and u its half derivative by s, an acceleration is affine in (u, x):
 
     d2q/dt2 = q'(s) u + q''(s) x,      x[i+1] = x[i] + 2 h[i] u[i]
 
 The reachable x at each grid point are an interval [0, beta] (TOPP-RA: Pham and Pham, A new approach to
-time-optimal path parameterization based on reachability analysis, 2018). Their program of two variables needs no
-solver here: with every row |P u + R x| <= C divided by P, the largest x from which beta[i+1] can be reached is
+time-optimal path parameterization based on reachability analysis, 2018). Their linear program of two variables needs
+no solver here: with every row |P u + R x| <= C divided by P, the largest x from which beta[i+1] can be reached is
 the least of functions that are affine in beta[i+1]. Both passes are scans over minima of such functions.
 
-Rows stand for both ends of every interval (Pham's "interpolation" scheme), so that the motion between the grid
-points keeps to the limits, too. In memory the intervals come last, (rows, intervals): numpy then works on long runs
-of numbers.
+Every interval has rows for both of its ends (Pham's "interpolation" scheme), so that the motion between the grid
+points keeps to the limits, too. Arrays have the shape (rows, intervals), since numpy is fast along a long last axis.
 """
 
 from __future__ import annotations
@@ -26,30 +25,30 @@ from armkin.formula.arrays import Array, Bool, Int, numbers_within
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.speed_bounds import TINY, Bound, Fastest, interval_parts
 
-_SLOPE_SAMPLES = 5  # samples that give a slope
-_MIN_SECTIONS = 16  # sections of samples between breaks from which on they are worked on together
-_UNBOUNDED_X = 1e18  # bound of x where nothing bounds it
-_EXCESS_FACTOR = 1.001  # factor, at most, on an acceleration, or on a speed squared, between grid points
-_SMALL_EXCESS = 1.0002  # factor up to which an excess is left as it is: most of the others are above 1 by rounding
-_MAX_ROUNDS = 8  # rounds, at most, in which excesses are taken away
-_SHARED_ROUNDS = 2  # rounds in which an interval is given less acceleration; then it is passed slower
-_FEW_SAMPLES = 400  # samples of a way up to which the law needs more grid points
+_SLOPE_SAMPLES = 5  # neighbouring samples that determine a slope
+_MIN_SECTIONS = 16  # with more sections than this, all are computed at once
+_UNBOUNDED_X = 1e18  # bound of x where no limit applies
+_EXCESS_FACTOR = 1.001  # allowed factor on accelerations and squared speeds between grid points
+_SMALL_EXCESS = 1.0002  # smaller excesses are mostly rounding and stay
+_MAX_ROUNDS = 8  # most rounds that remove excesses
+_SHARED_ROUNDS = 2  # rounds that lower the acceleration of an interval; later ones lower its speed
+_FEW_SAMPLES = 400  # paths with fewer samples get more grid points
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """What the motion keeps to, at every grid point or for all of them."""
+    """The limits of a motion, for every grid point or the same for all."""
 
     speed: Array  # (N, n) or (n,) [rad/s | mm/s]
     accel: Array  # (N, n) or (n,)
-    cap: Array  # (N,) of x: tool speed and whatever else bounds ds/dt
+    cap: Array  # (N,) greatest x, from the tool speed and other bounds of ds/dt
 
 
 def knots_of_samples(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequence[int] = ()) -> Knots:
-    """Slopes of samples from five neighbours each, none of them beyond a break (indices where q'' jumps).
+    """Samples as knots, with slopes from five neighbours each, none of them beyond a break (where q'' jumps).
 
-    s: (N,) increasing; q: (N, n). The slopes are exact to the fourth order of the spacing; at a break it is the
-    mean of both sides', but for those of them where the path rests, which stand twice.
+    s: (N,) increasing; q: (N, n). The slopes are exact to the fourth order of the spacing. A break has the mean slope
+    of its two sides; a break where the path rests becomes two knots, one for each slope.
     """
     N = len(s)
     edges = np.unique([0, N - 1, *breaks])
@@ -66,9 +65,9 @@ def knots_of_samples(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequ
 
 
 def _knots_in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
-    """`knots_of_samples` of many short sections, all at once.
+    """`knots_of_samples` for many short sections at once.
 
-    rests: (k,) at which of the edges between two of them it rests.
+    rests: (k,) whether the path rests at the edge between two sections.
     """
     size = np.diff(edges) + 1
     first = np.repeat(edges[:-1], size)
@@ -94,18 +93,18 @@ def _slopes_at(s: Array, q: Array, i: Int, first: Int, last: Int) -> Array:
     neighbours = np.clip(i - w // 2, first, last + 1 - w) + np.arange(w)[:, None]  # (w, m)
     x = s[neighbours]
     inverse = [np.prod([x[j] - x[m] for m in range(w) if m != j], axis=0) for j in range(w)]  # 1 / l_j
-    mine = np.choose(i - neighbours[0], inverse) if w > 1 else np.ones(len(i))
+    own_inverse = np.choose(i - neighbours[0], inverse) if w > 1 else np.ones(len(i))
     slopes = np.zeros_like(q[i])
     for j in range(w):
-        apart = x[j] - s[i]
-        distinct = apart != 0
-        weight = np.divide(mine, inverse[j] * -apart, out=np.zeros(len(i)), where=distinct)
+        difference = x[j] - s[i]
+        distinct = difference != 0
+        weight = np.divide(own_inverse, inverse[j] * -difference, out=np.zeros(len(i)), where=distinct)
         slopes += weight[:, None] * (q[neighbours[j]] - q[i])
     return slopes
 
 
 def refine_knots(path: Knots) -> Knots:
-    """The path's cubics on more grid points, if there are few: u is constant between two of them.
+    """Put the same cubics on more grid points if there are few, since u is constant between two of them.
 
     With 100 samples, twice as many points make the law of time 0.1 to 2 % faster.
     """
@@ -124,7 +123,7 @@ def refine_knots(path: Knots) -> Knots:
 
 
 def _interleave(inside: Array, last: Array) -> Array:
-    """Values at each fraction of every interval, (parts, N - 1, ...), one interval after the other, and the last."""
+    """Values at fractions of every interval, (parts, N - 1, ...), interval by interval, then the last value."""
     return np.concatenate([inside.swapaxes(0, 1).reshape(-1, *last.shape[1:]), last])
 
 
@@ -133,9 +132,9 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
 
     rows: weights (k, n) of joints and the greatest acceleration (k,) of each such sum: coupled motors.
 
-    Speeds and accelerations are bounded at both ends of every interval. Where one is above its limit in between, that
-    interval is given less, and all that depends on it is done again; what is left after some rounds, the law slows
-    down for, from rest to rest.
+    Speeds and accelerations are bounded at both ends of every interval. If one exceeds its limit in between, the limit
+    of that interval is lowered and the law is updated. An excess that remains after all rounds slows the whole part
+    between two rests down.
     """
     with np.errstate(over="ignore", divide="ignore", invalid="ignore"):
         cap = np.minimum(bounds.cap, _UNBOUNDED_X)
@@ -148,40 +147,40 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
             return np.asarray(cap)
         limits = Bound(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
         law = Fastest(limits, cap)
-        worst, moved = np.ones(len(path.h)), np.arange(len(path.h))
-        for round_ in range(_MAX_ROUNDS):
-            for part in interval_parts(len(moved)):
-                worst[moved[part]] = _lower_law(law, limits, speed, moved[part], share=round_ < _SHARED_ROUNDS)
+        worst, changed = np.ones(len(path.h)), np.arange(len(path.h))
+        for count in range(_MAX_ROUNDS):
+            for part in interval_parts(len(changed)):
+                worst[changed[part]] = _lower_law(law, limits, speed, changed[part], share=count < _SHARED_ROUNDS)
             if worst.max() <= _EXCESS_FACTOR:
                 return law.x
-            if round_ < _MAX_ROUNDS - 1:
-                bad, x = np.flatnonzero(worst > _SMALL_EXCESS), law.x
-                law.lower_speeds(_add_neighbours(bad, len(worst)))
-                gone = law.x != x
-                moved = np.flatnonzero(gone[1:] | gone[:-1] | (worst > _SMALL_EXCESS))
-        begins = np.concatenate([[0], path.rests + 1])  # each part between two rests slows down for itself
+            if count < _MAX_ROUNDS - 1:
+                excessive, x = np.flatnonzero(worst > _SMALL_EXCESS), law.x
+                law.lower_speeds(_add_neighbours(excessive, len(worst)))
+                x_changed = law.x != x
+                changed = np.flatnonzero(x_changed[1:] | x_changed[:-1] | (worst > _SMALL_EXCESS))
+        begins = np.concatenate([[0], path.rests + 1])  # each part between two rests has its own factor
         slower = np.maximum(np.maximum.reduceat(worst, begins), 1.0)
         return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
 
 
 def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
-    """Greatest shares of the limits in some intervals (k,); where one is above 1, the law is given less there."""
+    """Greatest shares of the limits in some intervals (k,); lowers the limits of those above 1."""
     motion, x0, x1 = limits.motion_in(intervals), law.x[intervals], law.x[intervals + 1]
-    over = motion.accel_shares(x0, x1)
-    rush = motion.squared_speed_shares(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
-    worst = np.maximum(over.max(axis=0), rush)
+    accel_shares = motion.accel_shares(x0, x1)
+    speed_shares = motion.squared_speed_shares(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
+    worst = np.maximum(accel_shares.max(axis=0), speed_shares)
     if share:
-        law.share[:, intervals] /= np.where(over > _SMALL_EXCESS, over, 1.0)
-    less = rush if share else worst
-    low = np.flatnonzero(less > _SMALL_EXCESS)
-    for points, x in ((intervals[low], x0[low]), (intervals[low] + 1, x1[low])):
-        np.fmin.at(law.cap, points, x / less[low])
+        law.share[:, intervals] /= np.where(accel_shares > _SMALL_EXCESS, accel_shares, 1.0)
+    excess = speed_shares if share else worst
+    excessive = np.flatnonzero(excess > _SMALL_EXCESS)
+    for points, x in ((intervals[excessive], x0[excessive]), (intervals[excessive] + 1, x1[excessive])):
+        np.fmin.at(law.cap, points, x / excess[excessive])
     return np.asarray(worst)
 
 
 def _add_neighbours(intervals: Int, count: int) -> Int:
-    """Intervals (k,), and those next to them, of so many."""
-    near = np.zeros(count + 2, bool)
+    """The given intervals (k,) and their neighbours, of `count` in all."""
+    selected = np.zeros(count + 2, bool)
     for k in (0, 1, 2):
-        near[intervals + k] = True
-    return np.flatnonzero(near[1:-1])
+        selected[intervals + k] = True
+    return np.flatnonzero(selected[1:-1])

@@ -1,7 +1,6 @@
 """A trajectory: joint values over time, made of stretches from rest to rest.
 
-It is said in joints and seconds and knows no board: counts, clock cycles and what a board can make belong to
-`armkin.board`, which cuts it up.
+Its units are those of the joints and seconds. `armkin.board` converts it to counts and clock cycles of a board.
 """
 
 from __future__ import annotations
@@ -23,8 +22,8 @@ from armkin.motion.timing.profile import Profile
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MAX_SECONDS = 86_400  # length [s], at most, of a trajectory: a day
-BRAKE_SHARE = 0.625  # share of the motors' accelerations with which a board stops on a curve
+MAX_SECONDS = 86_400  # longest trajectory [s]: a day
+BRAKE_SHARE = 0.625  # share of the motors' accelerations that a board uses to stop on a curve
 
 
 class Stretch(Protocol):
@@ -47,7 +46,7 @@ class Stretch(Protocol):
         """Greatest speed of every joint: (n,) [rad/s | mm/s]."""
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
-        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
+        """Joint values, or their first or second derivative, at times t [s] since its beginning: (T,) -> (T, n)."""
 
 
 @dataclass(frozen=True)
@@ -69,13 +68,13 @@ class Straight:
         return np.asarray(np.abs(self.end - self.start) * self.law.peak)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
-        """Joint values (order 0), speeds (1) or accelerations (2) at seconds since its beginning: (T,) -> (T, n)."""
-        along = self.law.evaluate(t, derivative)[:, None] * (self.end - self.start)
-        return np.asarray(self.start + along if derivative == 0 else along)
+        """Joint values, or their first or second derivative, at times t [s] since its beginning: (T,) -> (T, n)."""
+        change = self.law.evaluate(t, derivative)[:, None] * (self.end - self.start)
+        return np.asarray(self.start + change if derivative == 0 else change)
 
 
 def brake_share(stretch: Stretch) -> float:
-    """Share of the motors' accelerations with which a board stops on a stretch: all on a straight line."""
+    """The share of the motors' accelerations that a board uses to stop on a stretch: 1 on a straight line."""
     return 1.0 if isinstance(stretch, Straight) else BRAKE_SHARE
 
 
@@ -188,18 +187,18 @@ class Trajectory:
         return Trace(np.concatenate(times), q, frames(self.arm, q)[..., :3, 3])
 
     def _evaluate(self, t: ArrayLike, derivative: int) -> Array:
-        when = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
-        flat = when.ravel()
-        values = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat), 1))
-        numbers = np.searchsorted(self.begins, flat, side="right") - 1
+        times = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        flat_times = times.ravel()
+        values = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat_times), 1))
+        numbers = np.searchsorted(self.begins, flat_times, side="right") - 1
         numbers = np.clip(numbers, 0, max(len(self.stretches) - 1, 0))
-        for k, rows in group_numbers(numbers) if self.stretches else ():
-            values[rows] = self.stretches[k].evaluate(flat[rows] - self.begins[k], derivative)
-        return values.reshape(*when.shape, self.arm.n)
+        for number, rows in group_numbers(numbers) if self.stretches else ():
+            values[rows] = self.stretches[number].evaluate(flat_times[rows] - self.begins[number], derivative)
+        return values.reshape(*times.shape, self.arm.n)
 
 
 def group_numbers(numbers: NDArray[np.intp]) -> Iterator[tuple[int, NDArray[np.intp]]]:
-    """Numbers (N,) that occur, each once, and where it stands: in time that grows with N alone."""
+    """The distinct numbers of an array (N,), each with its indices, in time linear in N."""
     order = np.argsort(numbers, kind="stable")
     edges = [0, *(np.flatnonzero(np.diff(numbers[order])) + 1).tolist(), len(numbers)]
     for a, b in pairwise(edges):

@@ -1,8 +1,8 @@
-"""Cubic B-splines by least squares: many separate curves at once, in time and memory that grow with the points.
+"""Cubic B-splines by least squares: many separate curves at once, in time and memory linear in the points.
 
-Points are rows, one curve after another; some of them are knots, the first and the last of each curve always. A curve
-with K knots has K + 2 control points (its end knots count four times), and a normal matrix with three diagonals beside
-the main one, so that all curves together are one banded system.
+Points are rows in order, curve by curve. Some of them are knots, always including the first and the last of a curve. A
+curve with K knots has K + 2 control points, since its end knots count four times. Its normal matrix has three diagonals
+beside the main one, so all curves together make one banded system.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 
-_BEND_WEIGHT = 1e-7  # weight of the control polygon's bend, where points are too few to determine a curve
-_END_WEIGHT = 1e6  # weight of a curve's ends, which it passes
-_DENSE_BLOCKS = 16  # blocks up to which they are solved as one system
+_BEND_WEIGHT = 1e-7  # weight of the bend of control polygons, which decides where points are too few
+_END_WEIGHT = 1e6  # weight of the ends, which a curve passes
+_DENSE_BLOCKS = 16  # up to so many blocks are solved as one dense system
 _THIRDS = np.arange(4) / 3
 _TO_POWERS = np.linalg.inv(np.vander(_THIRDS, increasing=True))  # values at thirds -> coefficients
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where each point stands among the knots: (N,) rows, M intervals, C control points."""
+    """The intervals and control points of N points on splines with M intervals and C control points."""
 
     u: Array  # (N,) parameter of the points, increasing along a curve
     interval: Int  # (N,) interval that each point lies in
@@ -40,14 +40,15 @@ class Layout:
         places, curves = u[knot], curve[knot]
         inner = np.flatnonzero(curves[1:] == curves[:-1])  # knots at which an interval begins
         number = np.cumsum(knot) - 1
-        before = np.searchsorted(inner, number)  # intervals that begin before the point's knot
-        interval = before - (before == np.searchsorted(inner, number, side="right"))  # a curve's last knot: the last
+        begun = np.searchsorted(inner, number)  # intervals that begin before the point's knot
+        # the last knot is in the last interval
+        interval = begun - (begun == np.searchsorted(inner, number, side="right"))
         first = np.searchsorted(curves, curves[inner])
         last = np.searchsorted(curves, curves[inner], side="right") - 1
-        around = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
+        neighbours = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
         control = np.arange(len(inner)) + 3 * curves[inner]
         count = len(inner) + 3 * (int(curves[-1]) + 1)
-        return Layout(u, interval, places[inner], places[inner + 1], places[around], control, curves[inner], count)
+        return Layout(u, interval, places[inner], places[inner + 1], places[neighbours], control, curves[inner], count)
 
     def values(self, control: Array) -> Array:
         """Points of the curves at the layout's parameters: control points (C, d) -> (N, d)."""
@@ -90,14 +91,14 @@ def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
 
 
 def _add_ridge(layout: Layout, bands: Array) -> None:
-    """Add a small share of the squared bends of the control polygons, three control points after another."""
+    """Add a small weight of the squared bend of every three consecutive control points."""
     t = layout.knots
-    # Greville's places of an interval's four control points: means of three knots each
-    place = np.stack([t[k : k + 3].mean(axis=0) for k in range(4)], axis=1)
+    # Greville abscissae of an interval's four control points: means of three knots each
+    abscissae = np.stack([t[k : k + 3].mean(axis=0) for k in range(4)], axis=1)
     starts = np.append(True, layout.curve[1:] != layout.curve[:-1])
     for k in (0, 1):
         used = starts if k == 0 else np.ones(len(starts), bool)
-        a, b = place[used, k + 1] - place[used, k], place[used, k + 2] - place[used, k + 1]
+        a, b = abscissae[used, k + 1] - abscissae[used, k], abscissae[used, k + 2] - abscissae[used, k + 1]
         size = np.minimum(a, b)
         row = np.stack([size / a, -size / a - size / b, size / b], axis=1)
         rows = layout.control[used] + k
@@ -149,26 +150,26 @@ def solve_banded(bands: Array, right: Array) -> Array:
 
 
 def _solve_block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
-    """Symmetric block tridiagonal systems by cyclic reduction: every other block is eliminated, all at once.
+    """Solve a symmetric block tridiagonal system by cyclic reduction, which eliminates every other block at once.
 
     D: (M, k, k); U: (M - 1, k, k) blocks beside the diagonal; b: (M, k, d) -> (M, k, d).
     """
-    k, m = D.shape[1], len(D) // 2  # size of blocks, blocks that go
+    k, m = D.shape[1], len(D) // 2  # size of blocks, number of eliminated blocks
     if len(D) <= _DENSE_BLOCKS:
         matrix, i = np.zeros((len(D), k, len(D), k)), np.arange(len(D))
         matrix[i, :, i], matrix[i[:-1], :, i[1:]], matrix[i[1:], :, i[:-1]] = D, U, U.swapaxes(1, 2)
         return np.asarray(np.linalg.solve(matrix.reshape(len(D) * k, -1), b.reshape(len(D) * k, -1)).reshape(b.shape))
     left, right = U[0::2], np.zeros((m, k, k))
-    going = U[1::2]
-    right[: len(going)] = going
+    upper = U[1::2]
+    right[: len(upper)] = upper
     solved = np.linalg.solve(D[1::2], np.concatenate([left.swapaxes(1, 2), right, b[1::2]], axis=2))
     a, c, d = solved[..., :k], solved[..., k : 2 * k], solved[..., 2 * k :]
-    D_kept, b_kept, count = D[0::2].copy(), b[0::2].copy(), len(going)
+    D_kept, b_kept, count = D[0::2].copy(), b[0::2].copy(), len(upper)
     D_kept[:m] -= left @ a
     b_kept[:m] -= left @ d
-    back = going.swapaxes(1, 2)
-    D_kept[1 : 1 + count] -= back @ c[:count]
-    b_kept[1 : 1 + count] -= back @ d[:count]
+    lower = upper.swapaxes(1, 2)
+    D_kept[1 : 1 + count] -= lower @ c[:count]
+    b_kept[1 : 1 + count] -= lower @ d[:count]
     even_blocks = _solve_block_tridiagonal(D_kept, -(left @ c)[:count], b_kept)
     solution = np.empty_like(b)
     solution[0::2] = even_blocks

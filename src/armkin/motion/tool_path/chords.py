@@ -1,4 +1,4 @@
-"""Points one after another, and the chords between them."""
+"""The chords between consecutive points: lengths, turns and sagittas."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 
-CORNER_ANGLE = np.deg2rad(20.0)  # angle [rad] of a turn, above which it is rounded
-SHORT_SHARE = 1 / 3  # share of a chord: a shorter neighbour tells nothing of its curvature
-_SAME_POINT = 1e-6  # distance [mm] of points that are one
+CORNER_ANGLE = np.deg2rad(20.0)  # a turn above this angle [rad] is a corner
+SHORT_SHARE = 1 / 3  # a neighbour below this share of a chord does not determine its curvature
+_SAME_POINT = 1e-6  # distance [mm] below which points are the same
 
 
 @dataclass(frozen=True)
@@ -44,17 +44,17 @@ class Chords:
     @cached_property
     def sagitta(self) -> Array:
         """How far the circle through a chord's ends and either neighbour leaves the chord: (N - 1,)."""
-        L, rise_of_chord = self.length, np.zeros(len(self.length))
-        across = np.linalg.norm(self.y[2:] - self.y[:-2], axis=1)
-        turned = turn_angles(self.y)
+        L, sagittas = self.length, np.zeros(len(self.length))
+        span = np.linalg.norm(self.y[2:] - self.y[:-2], axis=1)
+        turns = turn_angles(self.y)
         with np.errstate(divide="ignore", invalid="ignore"):
-            bend = 2 * np.sin(turned) / across  # 1 / radius
+            bend = 2 * np.sin(turns) / span  # 1 / radius
         for chord, neighbour in ((slice(1, None), slice(None, -1)), (slice(None, -1), slice(1, None))):
-            half = np.minimum(0.5 * L[chord] * bend, 1.0)
-            rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - half**2)) / np.maximum(bend, 1e-300), 0.0)
-            tells = (turned <= CORNER_ANGLE) & (L[neighbour] >= SHORT_SHARE * L[chord])
-            rise_of_chord[chord] = np.maximum(rise_of_chord[chord], np.where(tells, rise, 0.0))
-        return rise_of_chord
+            sine = np.minimum(0.5 * L[chord] * bend, 1.0)
+            rise = np.where(bend > 1e-15, (1 - np.sqrt(1 - sine**2)) / np.maximum(bend, 1e-300), 0.0)
+            is_known = (turns <= CORNER_ANGLE) & (L[neighbour] >= SHORT_SHARE * L[chord])
+            sagittas[chord] = np.maximum(sagittas[chord], np.where(is_known, rise, 0.0))
+        return sagittas
 
 
 def turn_angles(y: Array) -> Array:
@@ -66,6 +66,6 @@ def turn_angles(y: Array) -> Array:
 
 
 def distinct_points(y: Array) -> Int:
-    """Numbers of the points (N, d) that are not the same as the one before; the last one stays."""
-    apart = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME_POINT
-    return np.flatnonzero(np.append(True, apart))
+    """Indices of the points (N, d) that differ from the next one, and of the last."""
+    is_new = np.linalg.norm(np.diff(y, axis=0), axis=1) > _SAME_POINT
+    return np.flatnonzero(np.append(True, is_new))

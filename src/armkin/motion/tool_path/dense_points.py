@@ -1,4 +1,4 @@
-"""Points on straight lines, gathered and made one smooth curve within the tolerance; any number of them at once."""
+"""Dense points of a path become smooth curves within the tolerance, in time linear in their number."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ from armkin.motion.tool_path.path_pieces import (
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
 
-FIT_SHARE = 0.94  # share of the tolerance from points to curve (from chords to curve: less, see `fit_points`)
-PLAN_SHARES = (0.1, 0.05, 0.02)  # shares of it from curve to motion: the first that holds for all points is taken
-_BLOCK_POINTS = 8192  # points, about, that are fitted together
-_FARTHEST_TURN = 5.0  # turn [rad], at most, that rotation vectors tell from less
+FIT_SHARE = 0.94  # share of the tolerance between points and curve
+PLAN_SHARES = (0.1, 0.05, 0.02)  # shares between curve and motion, tried in order
+_BLOCK_POINTS = 8192  # points that are fitted at once, approximately
+_FARTHEST_TURN = 5.0  # largest turn [rad] that rotation vectors represent safely
 _NAN = float("nan")
 
 
 class Polyline:
-    """Targets in the file's numbers, one after another, from a spot on; each with the speeds of the line to it."""
+    """Consecutive targets in the file's numbers behind a first one, each with the speeds of the line to it."""
 
     def __init__(self, task: Task, first: Spot) -> None:
         self.task, self.first = task, first
@@ -46,7 +46,7 @@ class Polyline:
         self._last: tuple[int, Spot] = (0, first)
 
     def add(self, values: Sequence[Sequence[float]], speed: float | None, tool_speed: float | None) -> None:
-        """More targets, with the speeds of the lines to them. Raises UsageError for one that is none of the task."""
+        """Add targets, with the speeds of the lines to them. Raises UsageError for one that does not fit the task."""
         for number, value in enumerate(values, len(self.rows) + 1):
             if len(value) != self.task.position:
                 self._last = number, path_numbers.target_spot(self.task, self.first, value)
@@ -58,39 +58,41 @@ class Polyline:
     def last(self) -> Spot:
         """The last target."""
         number, spot = self._last
-        if number < len(self.rows):  # the position alone was given since
+        if number < len(self.rows):  # later rows give the position alone
             self._last = len(self.rows), replace(spot, p=np.array(self.rows[-1], dtype=float))
         return self._last[1]
 
     def pieces(self, tolerance: float) -> list[Piece]:
-        """Smooth curves through all, one between each two places where the way turns back."""
+        """Smooth curves through all targets, divided where the path turns back."""
         spots = _Spots.from_rows(self.task, self.first, self.rows)
         speeds = np.array(self.speeds)
         y = spots.relative_values(0, len(spots.p) - 1)
-        if y is None:  # the tool turns so far that it is laid line by line
+        if y is None:  # the tool turns too far for one curve: straight lines
             return self._lines(spots, speeds)
         y = y * weights(self.task)
-        passed = distinct_points(y)
-        if len(passed) == 1:  # no way at all, which is refused of the whole route
+        distinct = distinct_points(y)
+        if len(distinct) == 1:  # no length at all, which the route reports
             return self._lines(spots, speeds)
-        back = 1 + np.flatnonzero(turn_angles(y[passed]) > REVERSAL_ANGLE) if len(passed) > 2 else np.zeros(0, int)
-        ends = np.concatenate([[0], back, [len(passed) - 1]])
-        turning = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
-        made: list[Piece] = []
-        for part in _point_blocks(ends, 1 if turning else _BLOCK_POINTS):
-            numbers, first = passed[part[0] : part[-1] + 1], int(passed[part[0]])
-            values = spots.relative_values(first, int(numbers[-1])) if turning else y[first : numbers[-1] + 1]
+        back = 1 + np.flatnonzero(turn_angles(y[distinct]) > REVERSAL_ANGLE) if len(distinct) > 2 else np.zeros(0, int)
+        ends = np.concatenate([[0], back, [len(distinct) - 1]])
+        turns = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
+        pieces: list[Piece] = []
+        for block in _point_blocks(ends, 1 if turns else _BLOCK_POINTS):
+            numbers, first = distinct[block[0] : block[-1] + 1], int(distinct[block[0]])
+            values = spots.relative_values(first, int(numbers[-1])) if turns else y[first : numbers[-1] + 1]
             assert values is not None
-            values = (values * weights(self.task) if turning else values)[numbers - first]
-            made += _fit_block(self.task, spots, numbers, part - part[0], values, speeds[numbers[1:] - 1], tolerance)
-        return made
+            values = (values * weights(self.task) if turns else values)[numbers - first]
+            pieces += _fit_block(
+                self.task, spots, numbers, block - block[0], values, speeds[numbers[1:] - 1], tolerance
+            )
+        return pieces
 
     def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
-        made = []
-        for k, (speed, tool) in enumerate(speeds.tolist()):
-            piece = line(self.task, spots.spot(k), spots.spot(k + 1))
-            made.append(replace(piece, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool)))
-        return made
+        pieces = []
+        for number, (speed, tool_speed) in enumerate(speeds.tolist()):
+            piece = line(self.task, spots.spot(number), spots.spot(number + 1))
+            pieces.append(replace(piece, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool_speed)))
+        return pieces
 
 
 @dataclass(frozen=True)
@@ -104,11 +106,11 @@ class _Spots:
 
     @staticmethod
     def from_rows(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
-        """The first spot, and rows of numbers as the file has them; of the position alone the rest stays."""
+        """The first spot and rows of numbers from the file; a row of a position keeps the orientation before it."""
         labels, N = task.labels, len(rows) + 1
         full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
         p = np.array([first.p, *((row[: task.position] for row in rows) if len(full) else rows)], dtype=float)
-        since = np.searchsorted(full, np.arange(N), side="right")  # 0: as at first
+        last_full = np.searchsorted(full, np.arange(N), side="right")  # 0: the first spot
         targets = targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
         k = len(task.sums)
         sums = np.zeros((len(full), k)) if targets is None or not k else targets[:, task.position : task.position + k]
@@ -120,24 +122,24 @@ class _Spots:
             elif targets is not None:
                 axis = targets[:, task.position + k : task.position + k + 3]
                 parts.append(axis / np.linalg.norm(axis, axis=1, keepdims=True))
-            turned = np.concatenate(parts)[since]
-        return _Spots(task, p, np.concatenate([first.sums[None], sums])[since], turned)
+            turned = np.concatenate(parts)[last_full]
+        return _Spots(task, p, np.concatenate([first.sums[None], sums])[last_full], turned)
 
     def spot(self, k: int) -> Spot:
         """The spot of point k."""
         return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
 
     def relative_values(self, a: int, b: int) -> Array | None:
-        """Spots a to b as y of a piece that starts at a, (b - a + 1, d); None: it turns too far for that."""
+        """Spots a to b as values y of a piece that starts at a, (b - a + 1, d); None: the tool turns too far."""
         w = np.zeros((b - a + 1, 3))
         if self.turned is not None and (self.turned[a : b + 1] != self.turned[a]).any():
             if self.task.orientation == "full":
                 w = rotation_vectors(self.turned[a : b + 1] @ self.turned[a].T)
                 for k in np.flatnonzero(np.linalg.norm(w, axis=1) > 0.5 * np.pi).tolist():
                     size = np.linalg.norm(w[k])
-                    longer = w[k] * (1 - 2 * np.pi / size)  # this is the rotation the other way round
-                    if k and np.linalg.norm(longer - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
-                        w[k] = longer
+                    opposite = w[k] * (1 - 2 * np.pi / size)  # the same rotation the other way round
+                    if k and np.linalg.norm(opposite - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
+                        w[k] = opposite
             else:
                 w = np.array([turn_between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
             if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
@@ -146,7 +148,7 @@ class _Spots:
 
 
 def _point_blocks(ends: Int, points: int) -> list[Int]:
-    """Ends of stretches (k,) in groups of about so many points, the last end of each the first of the next one."""
+    """Ends of curves (k,) in groups of about `points` points; each group begins with the last end of the one before."""
     first = np.flatnonzero(np.diff((ends[:-1] - ends[0]) // points, prepend=-1))
     return [ends[a : b + 1] for a, b in pairwise([*first.tolist(), len(ends) - 1])]
 
@@ -156,28 +158,28 @@ def _fit_block(
 ) -> list[Piece]:
     """Smooth curves through some of the spots, one from each of the ends to the next.
 
-    y: (N, d) the spots, in millimetres; speeds: (N - 1, 2) of the lines between them.
+    y: (N, d) values of the spots [mm]; speeds: (N - 1, 2) of the lines between them.
     """
     if len(numbers) == 2:
         return [_line_between(task, spots, numbers, speeds)]
-    moving = (y != y[0]).any(axis=0)  # the others stay
+    moving = (y != y[0]).any(axis=0)  # other components are constant
     scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
     curve: FittedCurves = fit_curves(y[:, moving], FIT_SHARE * tolerance, stop)
-    still = np.where(moving, 0.0, y[0] / weights(task))
+    constant = np.where(moving, 0.0, y[0] / weights(task))
 
     def curve_at(v: Array) -> tuple[Array, Array]:
-        values, slopes = np.repeat(still[:, None], len(v), axis=1), np.zeros((len(still), len(v)))
+        values, slopes = np.repeat(constant[:, None], len(v), axis=1), np.zeros((len(constant), len(v)))
         values[moving], slopes[moving] = (component.T / scale[:, None] for component in curve.values(v))
         return values.T, slopes.T
 
     piece, length = unit_speed_piece(task, spots.spot(numbers[0]), curve_at, curve.begin)
     passed, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
-    same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
-    changes = np.append(True, ~same.all(axis=1))
-    made = []
+    same_speed = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
+    changes = np.append(True, ~same_speed.all(axis=1))
+    pieces = []
     for a, b in pairwise(ends.tolist()):
         if b == a + 1:
-            made.append(_line_between(task, spots, numbers[a : b + 1], speeds[a:b]))
+            pieces.append(_line_between(task, spots, numbers[a : b + 1], speeds[a:b]))
             continue
         begins = a + np.flatnonzero(np.append(True, changes[a + 1 : b]))
         low, high = passed[a], passed[b]
@@ -192,8 +194,8 @@ def _fit_block(
             speeds[begins, 1],
         )
         first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
-        made.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
-    return made
+        pieces.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
+    return pieces
 
 
 def _curve_from(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:
@@ -202,9 +204,9 @@ def _curve_from(curve: Callable[[Array], Array], begin: float, s: Array) -> Arra
 
 def _line_between(task: Task, spots: _Spots, numbers: Int, speeds: Array) -> Piece:
     """The line between two spots."""
-    speed, tool = speeds[0].tolist()
-    made = line(task, spots.spot(numbers[0]), spots.spot(numbers[1]))
-    return replace(made, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool))
+    speed, tool_speed = speeds[0].tolist()
+    piece = line(task, spots.spot(numbers[0]), spots.spot(numbers[1]))
+    return replace(piece, speed=_none_if_nan(speed), tool_speed=_none_if_nan(tool_speed))
 
 
 def _none_if_nan(value: float) -> float | None:

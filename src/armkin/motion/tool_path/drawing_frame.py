@@ -1,4 +1,4 @@
-"""Where a drawing stands in an arm's frame, and how the tool is held on it."""
+"""The frame of a drawing in the arm's base frame, and the orientation of the tool on it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def place_drawing(arm: Arm, origin: Sequence[float], *, task: str | None = None,
     """The frame of a drawing whose zero is `origin`: x y z [mm], or with roll pitch yaw [deg].
 
     The tool points against the drawing's z: its rotation is that of `origin`, then half a turn about x. Raises
-    UsageError for a task that cannot hold it so.
+    UsageError for a task that cannot prescribe this orientation.
     """
     definition = task_for(arm, task)
     if definition.position != 3:
@@ -43,7 +43,7 @@ def place_drawing(arm: Arm, origin: Sequence[float], *, task: str | None = None,
 
 
 def _orientation_numbers(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple[float, ...]:
-    """What follows x y z in a target that holds the tool so."""
+    """The numbers of a target behind x y z that give the tool this rotation."""
     values = {"yaw": yaw, "roll": 0.0}
     if task.orientation == "full":
         values |= dict(zip(("roll", "pitch", "yaw"), units.angles_out(rpy(tool)).tolist(), strict=True))
@@ -55,7 +55,7 @@ def _orientation_numbers(arm: Arm, task: Task, tool: Array, yaw: float) -> tuple
 
 
 def _pitch_along(arm: Arm, task: Task, axis: Array) -> float:
-    """The pitch [deg] whose tool axis points along `axis`, the same wherever the arm's plane is turned to."""
+    """The pitch [deg] at which the tool points along `axis` at any angle of the arm's plane."""
     up = arm.base[:3, 2]
     if np.linalg.norm(np.cross(up, axis)) > _PLANE_SINE:
         raise UsageError(
@@ -63,13 +63,13 @@ def _pitch_along(arm: Arm, task: Task, axis: Array) -> float:
             "the base's z; place it without a tilt"
         )
     q = arm.home[None]
-    k = task.labels.index("phi")
-    sum_ = task.sums[k - task.position]
-    phi = float(targets_of(task, fk(arm, q), q)[0, k])
-    bent = q.copy()
-    pitch = int(np.flatnonzero(sum_)[-1])
-    bent[0, pitch] += 0.1 / (sum_[pitch] * arm.ratio[pitch])  # phi grows by 0.1
-    first, second = fk(arm, q)[0, :3, 2], fk(arm, bent)[0, :3, 2]
+    column = task.labels.index("phi")
+    weights = task.sums[column - task.position]
+    phi = float(targets_of(task, fk(arm, q), q)[0, column])
+    q_pitched = q.copy()
+    pitch = int(np.flatnonzero(weights)[-1])
+    q_pitched[0, pitch] += 0.1 / (weights[pitch] * arm.ratio[pitch])  # phi grows by 0.1
+    first, second = fk(arm, q)[0, :3, 2], fk(arm, q_pitched)[0, :3, 2]
     normal = np.cross(first, second)
     if np.linalg.norm(normal) < 1e-6 or abs(float(normal @ axis)) > _PLANE_SINE * 0.1:
         raise UsageError(f"the tool of {arm.name} does not lie in the arm's plane: no pitch points it straight down")

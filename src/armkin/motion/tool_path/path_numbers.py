@@ -1,4 +1,4 @@
-"""Moves as a path file has them, and its numbers, in millimetres and degrees, as joint values and targets."""
+"""Converts the numbers of a path file, in millimetres and degrees, to joint values and targets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ OF_JOINTS = ("joint", "wait", "grip")  # moves that need no targets
 
 
 def as_path_file(arm: Arm, path: Any, task: str | None = None) -> PathFile:
-    """Whatever `armkin.path` takes as the model of a path file."""
+    """The path file model of any argument that `armkin.path` accepts."""
     from armkin import path_file
 
     if isinstance(path, path_file.PathFile):
@@ -43,8 +43,8 @@ def as_path_file(arm: Arm, path: Any, task: str | None = None) -> PathFile:
         rows = rows / np.array(label_scale(definition.labels))[: rows.shape[-1]]
     if rows.ndim != 2 or len(rows) < 2 or not np.isfinite(rows).all():
         raise UsageError(f"a path of targets has shape (w, {len(definition.labels)}), w at least 2, all finite")
-    listed = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
-    return path_file.validate_path({"moves": listed, "task": definition.name})
+    moves = [{"point": rows[0].tolist()}, *({"line": row} for row in rows[1:].tolist())]
+    return path_file.validate_path({"moves": moves, "task": definition.name})
 
 
 def moves_tool(file: PathFile) -> bool:
@@ -54,41 +54,43 @@ def moves_tool(file: PathFile) -> bool:
     return point or any(move.kind not in OF_JOINTS for move in file.moves)
 
 
-def joint_values(arm: Arm, standing: Array, value: Any) -> Array:
-    """Joint values (n,) [rad | mm]: a list, a pose's name, or {name: value} with the others as they are now."""
+def joint_values(arm: Arm, present: Array, value: Any) -> Array:
+    """Joint values (n,) [rad | mm]: a list, a pose's name, or {name: value}, the others as at present."""
     if isinstance(value, str):
         if value not in arm.poses:
             raise UsageError(f"there is no pose '{value}'; {arm.name} has {', '.join(arm.poses)}")
         return np.asarray(arm.poses[value])
     if isinstance(value, Mapping):
-        wrong = [name for name in value if name not in arm.joint_names]
-        if wrong:
-            raise UsageError(f"there is no joint {wrong[0]}; {arm.name} has {', '.join(arm.joint_names)}")
-        standing_values = units.joints_out(arm, standing).tolist()
-        value = [value.get(name, before) for name, before in zip(arm.joint_names, standing_values, strict=True)]
+        unknown = [name for name in value if name not in arm.joint_names]
+        if unknown:
+            raise UsageError(f"there is no joint {unknown[0]}; {arm.name} has {', '.join(arm.joint_names)}")
+        present_values = units.joints_out(arm, present).tolist()
+        value = [
+            value.get(name, present_value) for name, present_value in zip(arm.joint_names, present_values, strict=True)
+        ]
     if len(value) != arm.n:
         raise UsageError(f"{arm.name} has {arm.n} joints ({', '.join(arm.joint_names)}); got {len(value)} values")
     return np.asarray(units.joints_in(arm, value))
 
 
 def target_spot(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
-    """A target; with the position alone the sums and the orientation stay as they are now."""
+    """The spot of a target's numbers; a position alone keeps the last sums and orientation."""
     labels = task.labels
     if len(value) == task.position < len(labels):
         return replace(last_spot, p=np.asarray(value, dtype=float))
     if len(value) != len(labels):
-        short = f", or {' '.join(labels[: task.position])} alone" if len(labels) > task.position else ""
-        raise UsageError(f"a target of task {task.name} is {' '.join(labels)}{short}; got {len(value)} numbers")
+        alternative = f", or {' '.join(labels[: task.position])} alone" if len(labels) > task.position else ""
+        raise UsageError(f"a target of task {task.name} is {' '.join(labels)}{alternative}; got {len(value)} numbers")
     if task.orientation == "axis" and not np.linalg.norm(value[-3:]) > 1e-9:
         raise UsageError("a target's axis ax ay az has no length")
-    [made] = targets_in(labels, [value])
-    return split_target(task, made)
+    [target] = targets_in(labels, [value])
+    return split_target(task, target)
 
 
 def check_numbers(arm: Arm, file: PathFile) -> None:
-    """Raise UsageError where a move has too few or too many numbers for the arm; where they lead is planning's."""
+    """Raise UsageError where a move has too few or too many numbers for the arm; reach is not tested."""
     task = None
-    for k, move in enumerate(file.moves):
+    for number, move in enumerate(file.moves):
         kind = move.kind
         try:
             value = getattr(move, kind)
@@ -100,7 +102,7 @@ def check_numbers(arm: Arm, file: PathFile) -> None:
                 task = task or task_for(arm, file.task)
                 _check_targets(task, kind, value)
         except UsageError as error:
-            raise error.within(file.place_of(k, k), move=k + 1) from None
+            raise error.within(file.place_of(number, number), move=number + 1) from None
 
 
 def _check_targets(task: Task, kind: str, value: Any) -> None:

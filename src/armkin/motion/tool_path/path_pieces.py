@@ -23,12 +23,12 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.rotation import quaternion
 from armkin.motion.tool_path.b_spline import solve_banded
 
-PER_RADIAN = 30.0  # lever [mm/rad] at which a turn of the tool counts as a way
-MIN_LENGTH = 1e-9  # length [mm] below which a piece is none
+PER_RADIAN = 30.0  # length [mm] that counts for a radian of turning
+MIN_LENGTH = 1e-9  # pieces below this length [mm] are left out
 _GAUSS_NODES = (np.array([-1, 1]) / math.sqrt(3) + 1) / 2
-_TABLE_INTERVALS, _MIN_TABLE_INTERVALS = 96, 4  # intervals of a curved span's lengths, with few spans and many
-_ALL_TABLE_INTERVALS = 20_000  # intervals of all spans' tables
-_EVEN_SLOPE, _LENGTH_ERROR = 1e-9, 1e-6  # relative change of a slope that is none; error [mm] of a length
+_TABLE_INTERVALS, _MIN_TABLE_INTERVALS = 96, 4  # most and fewest intervals of a curved span's length table
+_ALL_TABLE_INTERVALS = 20_000  # intervals of all length tables together
+_EVEN_SLOPE, _LENGTH_ERROR = 1e-9, 1e-6  # relative change of a slope that counts as constant; error [mm] of a length
 
 
 def rotation_matrices(w: Array) -> Array:
@@ -50,7 +50,7 @@ def rotation_vectors(R: Array) -> Array:
 
 @dataclass(frozen=True)
 class Spot:
-    """A target taken apart: position, sums, and an orientation (3, 3) or a direction (3,) or nothing."""
+    """The parts of a target: position, sums of angles, and an orientation (3, 3), a direction (3,) or None."""
 
     p: Array
     sums: Array
@@ -58,7 +58,7 @@ class Spot:
 
 
 def split_target(task: Task, target: ArrayLike) -> Spot:
-    """A target (m,) or (4, 4) of a task, taken apart."""
+    """The parts of a task's target (m,) or (4, 4)."""
     values = np.asarray(target, dtype=float)
     if task.orientation == "full":
         return Spot(values[:3, 3], np.zeros(0), values[:3, :3])
@@ -83,7 +83,7 @@ def turn_between(task: Task, a: Spot, b: Spot) -> Array:
 
 @dataclass(frozen=True)
 class Dense:
-    """What a piece knows of the points that it was made from; all lengths [mm] are counted along the piece."""
+    """The given points from which a piece was fitted; all lengths [mm] are along the piece."""
 
     given: Array  # (N,) where each point is passed
     points: Array  # (N, 2 or 3) the points' positions
@@ -94,7 +94,7 @@ class Dense:
     tool_speed: Array  # (c,) [mm/s]; nan: the path's
 
     def part(self, a: float, b: float) -> Dense:
-        """What is known of the part from length a to b [mm]."""
+        """The points and lengths of the part from length a to b [mm]."""
         passed, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
         return replace(
             self,
@@ -135,16 +135,16 @@ class Piece:
 
     @cached_property
     def last(self) -> Spot:
-        """Where it ends."""
+        """The spot at its end."""
         return split_target(self.task, self.targets(np.array([self.length]))[0])
 
     def direction(self, s: float) -> Array:
         """d(position, sums, angle)/ds at s, angles in units of PER_RADIAN: a unit vector (dim,)."""
         h = min(1e-5 * self.length, 1e-3)
         a, b = max(s - h, 0.0), min(s + h, self.length)
-        before, after = (split_target(self.task, t) for t in self.targets(np.array([a, b])))
-        w = turn_between(self.task, before, after)
-        change = np.concatenate([after.p - before.p, PER_RADIAN * (after.sums - before.sums), PER_RADIAN * w])
+        start, end = (split_target(self.task, t) for t in self.targets(np.array([a, b])))
+        w = turn_between(self.task, start, end)
+        change = np.concatenate([end.p - start.p, PER_RADIAN * (end.sums - start.sums), PER_RADIAN * w])
         return np.asarray(change / (b - a))
 
     def part(self, a: float, b: float) -> Piece:
@@ -167,8 +167,8 @@ class Piece:
 def line(task: Task, a: Spot, b: Spot) -> Piece:
     """A straight line; orientation by slerp, sums linearly."""
     size = float(np.linalg.norm(b.p - a.p))
-    made = _uniform_piece(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
-    return replace(made, rate=size / made.length) if made.length > 0 else made
+    piece = _uniform_piece(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
+    return replace(piece, rate=size / piece.length) if piece.length > 0 else piece
 
 
 def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:
@@ -179,13 +179,13 @@ def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise
     radius = float(np.linalg.norm(radial))
     if radius < 1e-6:
         raise UsageError("the circle's centre lies on the point where the circle starts: it has no radius")
-    across = np.cross(n, radial) if len(a.p) == 3 else np.array([-radial[1], radial[0]]) * n[-1]
+    tangent = np.cross(n, radial) if len(a.p) == 3 else np.array([-radial[1], radial[0]]) * n[-1]
     base = a.p - radial
 
     def position(f: Array) -> Array:
         t = (f * angle)[:, None]
-        flat = base + np.cos(t) * radial + np.sin(t) * across
-        return np.asarray(flat + f[:, None] * rise * n if len(a.p) == 3 else flat)
+        point = base + np.cos(t) * radial + np.sin(t) * tangent
+        return np.asarray(point + f[:, None] * rise * n if len(a.p) == 3 else point)
 
     length = math.hypot(radius * angle, rise)
     b = end or Spot(position(np.ones(1))[0], a.sums, a.turned)
@@ -209,7 +209,7 @@ def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
 
 
 def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
-    """A smooth curve through points: natural cubic in the root of the chord lengths (centripetal)."""
+    """A natural cubic spline through points, its parameter the square roots of chord lengths (centripetal)."""
     spots = [a, *points]
     y = np.array([relative_values(task, a, s) for s in spots])
     chord = np.linalg.norm(np.diff(y * weights(task), axis=0), axis=1)
@@ -226,25 +226,25 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
 
     v = divide_spans(u, _table_intervals(len(u) - 1))
     tangent = curve(v)[1] * weights(task)
-    back = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
-    if len(back):
-        place = ", ".join(f"{x:.6g}" for x in curve(v[back[:1] + 1])[0][0, : task.position])
+    reversals = np.flatnonzero((tangent[2:] * tangent[:-2]).sum(axis=1) < 0)
+    if len(reversals):
+        place = ", ".join(f"{x:.6g}" for x in curve(v[reversals[:1] + 1])[0][0, : task.position])
         raise UsageError(f"a spline turns back by half a turn near {place}: use lines, which stop there")
     return unit_speed_piece(task, a, curve, u)[0]
 
 
 def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece, float]:
-    """Two pieces that meet at a corner, rounded within a sphere about it: first, blend, second, and the radius.
+    """Round the corner of two pieces within a sphere around it: first piece, blend, second piece, and the radius.
 
-    side: the first piece's length before the blend at its other end. The radius is `radius`, or less where half of
-    a side is nearer.
+    side: the first piece's length before the blend at its other end. The radius is `radius`, or less to leave half of
+    each side.
     """
     corner, half = b.first.p, max(a.length - side / 2, 0.0)
     radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
     cut_a = _length_at_radius(a, corner, radius, a.length, half)
     cut_b = _length_at_radius(b, corner, radius, 0.0, b.length / 2)
-    before, after = a.part(0.0, cut_a), b.part(cut_b, b.length)
-    start, end = before.last, after.first
+    first, second = a.part(0.0, cut_a), b.part(cut_b, b.length)
+    start, end = first.last, second.first
     y0, y1 = relative_values(task, start, start), relative_values(task, start, end)
     scale = weights(task)
     d0, d1 = a.direction(cut_a) / scale, b.direction(cut_b) / scale
@@ -261,8 +261,8 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
     speeds = [x.speed for x in (a, b) if x.speed is not None]
     tools = [x.tool_speed for x in (a, b) if x.tool_speed is not None]
     made, _ = unit_speed_piece(task, start, curve, np.array([0.0, 1.0]))
-    slow = replace(made, speed=min(speeds, default=None), tool_speed=min(tools, default=None))
-    return before, slow, after, radius
+    middle = replace(made, speed=min(speeds, default=None), tool_speed=min(tools, default=None))
+    return first, middle, second, radius
 
 
 def _distance_from(piece: Piece, corner: Array, s: float) -> float:
@@ -274,16 +274,16 @@ def _length_at_radius(piece: Piece, corner: Array, radius: float, inner: float, 
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
     if piece.rate:
         return inner + math.copysign(radius / piece.rate, outer - inner)
-    for _ in range(6):  # each time a part of 1/100 of what is left
+    for _ in range(6):  # each step divides the interval by 100
         s = np.linspace(inner, outer, 101)
-        away = np.linalg.norm(piece.curve(s)[:, : piece.task.position] - corner, axis=1)
-        k = min(int(np.argmax(away[1:] >= radius)), 99) if (away[1:] >= radius).any() else 99
-        inner, outer = float(s[k]), float(s[k + 1])
+        distances = np.linalg.norm(piece.curve(s)[:, : piece.task.position] - corner, axis=1)
+        interval = min(int(np.argmax(distances[1:] >= radius)), 99) if (distances[1:] >= radius).any() else 99
+        inner, outer = float(s[interval]), float(s[interval + 1])
     return outer
 
 
 def _uniform_piece(task: Task, a: Spot, b: Spot, position: Callable[[Array], Array], length: float) -> Piece:
-    """A piece whose position, sums and turning all are passed at constant speed; position: fraction -> position."""
+    """A piece with constant rates of position, sums and turning; position: function of the fraction of its length."""
     w = turn_between(task, a, b)
     change = b.sums - a.sums
     angle = math.hypot(float(np.linalg.norm(change)), float(np.linalg.norm(w)))
@@ -300,9 +300,9 @@ def _uniform_piece(task: Task, a: Spot, b: Spot, position: Callable[[Array], Arr
 def unit_speed_piece(
     task: Task, first: Spot, curve: Callable[[Array], tuple[Array, Array]], u: Array
 ) -> tuple[Piece, Callable[[Array], Array]]:
-    """A piece from a curve over any parameter, given with its derivative, smooth between the values u.
+    """A piece from a curve over any parameter, which gives points and derivatives and is smooth between the values u.
 
-    Returns also the function from parameters to lengths.
+    Also returns the function from parameters to lengths.
     """
     scale = weights(task)
     grid = np.append(divide_spans(u, _table_sizes(curve, u, scale)), u[-1])
@@ -311,10 +311,10 @@ def unit_speed_piece(
     speed = np.linalg.norm(curve(nodes.ravel())[1] * scale, axis=1).reshape(nodes.shape)
     s = np.concatenate([[0.0], np.cumsum(speed.mean(axis=1) * step)])
     y, left = curve(grid)
-    right = curve(grid[1:] - 1e-9 * step)[1]  # where the way rests in a corner it comes and goes in two directions
+    right = curve(grid[1:] - 1e-9 * step)[1]  # a corner has two directions
     left, right = (d / np.maximum(np.linalg.norm(d * scale, axis=1), 1e-12)[:, None] for d in (left[:-1], right))
     moving = np.flatnonzero((y != y[0]).any(axis=0))
-    h, still = np.diff(s), y[0]
+    h, constant = np.diff(s), y[0]
     y0, d0, d1 = y[:-1, moving], left[:, moving] * h[:, None], right[:, moving] * h[:, None]  # left, right: dy/ds
     chord = y[1:, moving] - y0
     powers = np.stack([y0.T, d0.T, (3 * chord - 2 * d0 - d1).T, (d0 + d1 - 2 * chord).T])  # (4, d, intervals)
@@ -324,7 +324,7 @@ def unit_speed_piece(
         i = inner.searchsorted(x, side="right")
         f = (x - s.take(i)) / h.take(i)
         c0, c1, c2, c3 = powers.take(i, axis=2)
-        y_at = np.repeat(still[:, None], len(x), axis=1)
+        y_at = np.repeat(constant[:, None], len(x), axis=1)
         y_at[moving] = c0 + f * (c1 + f * (c2 + f * c3))
         return y_at.T
 
@@ -332,36 +332,36 @@ def unit_speed_piece(
 
 
 def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale: Array) -> NDArray[np.intp]:
-    """How many intervals of a table of lengths each span between the values u needs: one that is passed evenly, one."""
+    """The number of intervals of the length table in each span between the values u; 1 for a span of constant speed."""
     f = (np.arange(4) + 0.5) / 4
     v = u[:-1, None] + np.diff(u)[:, None] * f
     slopes = (curve(v.ravel())[1] * scale).reshape(*v.shape, -1)
-    most = np.abs(slopes).max(axis=(1, 2))
+    largest = np.abs(slopes).max(axis=(1, 2))
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
     needed = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
-    even = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * most
-    return np.where(even, 1, np.clip(needed, _MIN_TABLE_INTERVALS, _table_intervals(len(u) - 1))).astype(np.intp)
+    is_constant = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * largest
+    return np.where(is_constant, 1, np.clip(needed, _MIN_TABLE_INTERVALS, _table_intervals(len(u) - 1))).astype(np.intp)
 
 
 def _table_intervals(spans: int) -> int:
-    """Number of intervals of the table of lengths for each of so many spans."""
+    """The most intervals of the length table in each of `spans` spans."""
     return int(np.clip(_ALL_TABLE_INTERVALS // max(spans, 1), _MIN_TABLE_INTERVALS, _TABLE_INTERVALS))
 
 
 def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:
-    """Every span between the values u in so many equal parts, without the last value."""
+    """Divide every span between the values u into equal parts; the last value is left out."""
     count = np.broadcast_to(parts, len(u) - 1)
     share = numbers_within(count) / np.repeat(count, count)
     return np.asarray(np.repeat(u[:-1], count) + np.repeat(np.diff(u), count) * share)
 
 
 def relative_values(task: Task, a: Spot, b: Spot) -> Array:
-    """A spot as y of a piece that starts at `a`."""
+    """Spot b as values y of a piece that starts at spot a."""
     return np.concatenate([b.p, b.sums, turn_between(task, a, b)])
 
 
 def weights(task: Task) -> Array:
-    """What a unit of each component of y is worth in length."""
+    """The length that a unit of each component of y counts."""
     return np.concatenate([np.ones(task.position), np.full(len(task.sums) + 3, PER_RADIAN)])
 
 

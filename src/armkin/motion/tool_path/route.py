@@ -1,4 +1,4 @@
-"""A route: pieces one after another, with rests between them where they meet at a corner."""
+"""A route: consecutive pieces of a tool path, with blends or rests at their corners."""
 
 from __future__ import annotations
 
@@ -15,20 +15,20 @@ from armkin.motion.timing.trajectory import group_numbers
 from armkin.motion.tool_path.fit_points import REVERSAL_ANGLE
 from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Dense, Piece, blend
 
-_ONE_BREAK = 1e-6  # distance [mm] of breaks that are one
-_SMOOTH_ANGLE = 1e-3  # angle [rad] between two directions that count as one
+_ONE_BREAK = 1e-6  # distance [mm] below which two breaks are one
+_SMOOTH_ANGLE = 1e-3  # angle [rad] below which two directions are the same
 
 
 @dataclass(frozen=True)
 class Detour:
-    """From length `begin` to `end` the way goes aside: by `displacement` (3,) [mm] in its middle third."""
+    """A displacement (3,) [mm] of the path between lengths `begin` and `end`, whole in the middle third."""
 
     begin: float
     end: float
     displacement: Array
 
     def offset(self, s: Array) -> Array:
-        """How far aside at lengths s (N,): (N, 3) [mm], with a bend that does not jump."""
+        """The displacement at lengths s (N,): (N, 3) [mm], with continuous second derivative."""
         f = (s - self.begin) / (self.end - self.begin)
         f = np.clip(3 * np.minimum(f, 1 - f), 0.0, 1.0)
         return np.asarray((f**3 * (10 - f * (15 - 6 * f)))[:, None] * self.displacement)
@@ -36,7 +36,7 @@ class Detour:
 
 @dataclass(frozen=True)
 class Route:
-    """Pieces in order; `rests`: numbers of the pieces before which the arm stands, and for how long."""
+    """Consecutive pieces of a tool path, and where the arm stops on them."""
 
     task: Task
     pieces: tuple[Piece, ...]
@@ -45,7 +45,7 @@ class Route:
 
     @cached_property
     def ends(self) -> Array:
-        """Where pieces begin, and the end: (pieces + 1,) [mm]."""
+        """The lengths at which pieces begin, and the end: (pieces + 1,) [mm]."""
         return np.concatenate([[0.0], np.cumsum([piece.length for piece in self.pieces])])
 
     @property
@@ -72,26 +72,26 @@ class Route:
 
     @cached_property
     def largest_detour(self) -> float:
-        """How far its detours lead away from its pieces, at most [mm]."""
+        """The largest displacement of its detours [mm]."""
         return max((float(np.linalg.norm(detour.displacement)) for detour in self.detours), default=0.0)
 
     @cached_property
     def breaks(self) -> Array:
-        """Where the curvature may jump: ends of pieces, and bends inside of dense ones, sorted [mm]."""
-        inside = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
-        if not inside:
+        """The sorted lengths [mm] where the curvature may jump: ends of pieces, and bends inside dense ones."""
+        bends = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
+        if not bends:
             return self.ends
-        breaks = np.sort(np.concatenate([self.ends, *inside]))
-        apart = np.append(True, np.diff(breaks) > _ONE_BREAK)  # blends that take half of a side each meet in its middle
-        breaks = breaks[apart]
+        breaks = np.sort(np.concatenate([self.ends, *bends]))
+        distinct = np.append(True, np.diff(breaks) > _ONE_BREAK)  # two blends may meet in the middle of a side
+        breaks = breaks[distinct]
         breaks[-1] = self.length
         return np.asarray(breaks)
 
     @cached_property
     def spans(self) -> Array:
-        """Where the cubics of dense pieces begin and end: a grid is no coarser [mm]."""
-        inside = [self.ends[k] + p.dense.spans for k, p in enumerate(self.pieces) if p.dense is not None]
-        return np.concatenate(inside) if inside else np.zeros(0)
+        """The lengths [mm] where cubics of dense pieces begin and end, which every grid includes."""
+        spans = [self.ends[k] + p.dense.spans for k, p in enumerate(self.pieces) if p.dense is not None]
+        return np.concatenate(spans) if spans else np.zeros(0)
 
     @cached_property
     def given_points(self) -> tuple[Array, Array]:
@@ -103,7 +103,7 @@ class Route:
 
     @cached_property
     def _paces(self) -> tuple[Array, Array, Array]:
-        """Where each speed begins, fraction of the joints' speed and tool speed; nan: it has none of its own."""
+        """The lengths where speeds begin, fractions of the joints' speed, and tool speeds; nan: the path's own."""
         rows = []
         for begin, piece in zip(self.ends, self.pieces, strict=False):
             paces = (piece.speed, piece.tool_speed)
@@ -120,20 +120,20 @@ class Route:
         begins, *paces_of_begin = self._paces
         numbers = np.searchsorted(begins, (s[:-1] + s[1:]) / 2, side="right") - 1
         parts, tools = (paces[numbers] for paces in paces_of_begin)
-        most = np.inf if tool is None else tool
-        return np.where(np.isnan(parts), speed, parts), np.where(np.isnan(tools), most, tools)
+        path_speed = np.inf if tool is None else tool
+        return np.where(np.isnan(parts), speed, parts), np.where(np.isnan(tools), path_speed, tools)
 
 
 @dataclass
 class ReducedBlends:
-    """Blends that did not fit: how many, and of the smallest what was wished and what it became [mm]."""
+    """The number of blends that did not fit, and the wanted and actual radius [mm] of the smallest."""
 
     count: int = 0
     wished: float = 0.0
     became: float = np.inf
 
     def note(self, wished: float, became: float) -> None:
-        """Count a blend, if it became smaller."""
+        """Count a blend whose radius was reduced."""
         if became >= wished * (1 - 1e-9):
             return
         self.count += 1
@@ -149,45 +149,45 @@ def join_pieces(
     tolerance: float = 0.0,
     reduced: ReducedBlends | None = None,
 ) -> tuple[Route, dict[int, int]]:
-    """Pieces as a route: corners rounded by their blends (one for each piece's end), rests where there is none.
+    """Join pieces to a route, with a blend or a stop at each corner; blends: one for each piece's end.
 
     blends: [mm], None: the largest that passes the corner within `tolerance`. pauses: numbers of pieces before which
-    the arm has to stand in any case. Returns the route, and for each of them the number of the piece in it; blends
-    that do not fit are made smaller, and noted in `reduced`.
+    the arm has to stop. Returns the route, and the number in it of each piece with a pause. Blends that do not fit are
+    reduced, and counted in `reduced`.
     """
     reduced = ReducedBlends() if reduced is None else reduced
-    made: list[Piece] = []
-    side = 0.0  # length of the last piece, before it was cut
+    joined: list[Piece] = []
+    side = 0.0  # length of the last piece before its blend
     stops, order = {0}, {}
     rests: set[int] = set()  # values of `order`
-    for k, piece in enumerate(pieces):
-        if k in pauses:
-            order[k] = len(made)
-            rests.add(len(made))
+    for number, piece in enumerate(pieces):
+        if number in pauses:
+            order[number] = len(joined)
+            rests.add(len(joined))
         if piece.length < MIN_LENGTH:
             continue
-        if not made or len(made) in rests:
-            stops.add(len(made))
-            made.append(piece)
+        if not joined or len(joined) in rests:
+            stops.add(len(joined))
+            joined.append(piece)
             side = piece.length
             continue
-        before, wish = made[-1], blends[k - 1]
-        angle = _corner_angle(before, piece)
+        previous, wanted = joined[-1], blends[number - 1]
+        angle = _corner_angle(previous, piece)
         if angle < _SMOOTH_ANGLE:
-            made.append(piece)
-        elif (radius := _blend_radius(before, piece, angle, wish, tolerance)) <= 0:
-            stops.add(len(made))
-            made.append(piece)
+            joined.append(piece)
+        elif (radius := _blend_radius(previous, piece, angle, wanted, tolerance)) <= 0:
+            stops.add(len(joined))
+            joined.append(piece)
         else:
-            first, middle, last, radius_kept = blend(task, before, piece, radius, side)
-            if wish is None:
+            first, middle, last, radius_kept = blend(task, previous, piece, radius, side)
+            if wanted is None:
                 middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
             else:
-                reduced.note(wish, radius_kept)
-            made[-1:] = [p for p in (first, middle, last) if p is last or p.length > MIN_LENGTH]
+                reduced.note(wanted, radius_kept)
+            joined[-1:] = [p for p in (first, middle, last) if p is last or p.length > MIN_LENGTH]
         side = piece.length
-    stops.add(len(made))
-    return Route(task, tuple(made), frozenset(stops)), order
+    stops.add(len(joined))
+    return Route(task, tuple(joined), frozenset(stops)), order
 
 
 def _corner_angle(last_piece: Piece, piece: Piece) -> float:
@@ -196,22 +196,22 @@ def _corner_angle(last_piece: Piece, piece: Piece) -> float:
     return float(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b)), -1, 1)))
 
 
-def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wish: float | None, tolerance: float) -> float:
-    """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wish: see `join_pieces`'s blends."""
+def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wanted: float | None, tolerance: float) -> float:
+    """The radius of a corner's blend [mm]; 0: none, and the arm rests there. wanted: as in `join_pieces`'s blends."""
     # a cubic blend passes its corner at r |a - b| / 4
-    radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wish is None else wish
-    sharpest = REVERSAL_ANGLE if wish is None else np.pi - _SMOOTH_ANGLE
+    radius = 2 * tolerance / max(np.sin(angle / 2), 1e-12) if wanted is None else wanted
+    sharpest = REVERSAL_ANGLE if wanted is None else np.pi - _SMOOTH_ANGLE
     return radius if radius > 0 and angle <= sharpest and both_move(last_piece, piece) else 0.0
 
 
 def _dense_of_corner(piece: Piece, corner: Array) -> Dense:
-    """A blend that has a given corner to pass in its middle."""
+    """The given point of a blend: its corner, passed in the middle."""
     none = np.zeros(0)
     return Dense(np.array([piece.length / 2]), corner[None], none, none, none, none, none)
 
 
 def both_move(a: Piece, b: Piece) -> bool:
-    """Whether the position moves in both: a pure turn has no sphere to be blended in."""
+    """Whether the position moves in both pieces, since a pure rotation cannot be blended within a sphere."""
     return _position_moves(a) and _position_moves(b)
 
 
