@@ -63,7 +63,8 @@ def test_a_row_s_weight_is_the_slope_of_its_cost() -> None:
     low, high = (np.sqrt(np.maximum(squares + side, 0.0)) for side in (-step, step))
 
     def cost(r: float) -> float:
-        return robust_fit._cost(np.array([[r, 0.0, 0.0]]), None, (1.0, 1.0), np.zeros(1))
+        missed = robust_fit.Residuals(np.array([[r, 0.0, 0.0]]), turn=None, jacobian=np.zeros((1, 6, 1)))
+        return robust_fit._cost(missed, (1.0, 1.0), np.zeros(1))
 
     slopes = [(cost(b) - cost(a)) / (b * b - a * a) for a, b in zip(low, high, strict=True)]
     r = np.sqrt(squares)[:, None] * [1.0, 0.0, 0.0]

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
-from armkin.calibration.corrected_chain import KINDS, correction_model
+from armkin.calibration.corrected_chain import KINDS, Model, correction_model
 from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check_measurements
 from armkin.calibration.model_selection import LEVELS, MANY_ROWS, Choice, choose_level, free_at
-from armkin.calibration.robust_fit import Measurements
+from armkin.calibration.robust_fit import Fit, Measurements
 from armkin.errors import UsageError
 from armkin.export import conventions
 from armkin.formula import arrays
@@ -135,13 +135,6 @@ def calibrate(
     _must_explain(rows, choice)
     best_fit = choice.fit
     corrected_arm, tool = corrections.corrected_arm(best_fit.p)
-    doubts = observability.doubts(corrections, best_fit) if len(best_fit.free) else np.zeros(0)
-    if len(rows) < STATED:
-        doubts = np.full(len(doubts), np.nan)
-    listed = [
-        (corrections.parameters[k].name, float(best_fit.p[k]), float(doubt), corrections.parameters[k].unit)
-        for k, doubt in zip(best_fit.free, doubts, strict=True)
-    ]
     return Calibration(
         arm=corrected_arm,
         data=conventions.screws(corrected_arm, conventions.tool_of(arm) @ tool),
@@ -150,10 +143,22 @@ def calibrate(
         after=choice.errors[choice.level],
         flagged=dropped_row_numbers(best_fit.weights),
         noise=best_fit.scale[0],
-        corrections=listed,
+        corrections=_list_corrections(corrections, best_fit, len(rows)),
         unseen=observability.unseen_corrections(corrections, best_fit),
         held=held,
     )
+
+
+def _list_corrections(model: Model, fit: Fit, rows: int) -> list[tuple[str, float, float, str]]:
+    """Name, value, standard deviation (nan: from few rows) and unit (mm, rad, 1) of each free correction."""
+    deviations = observability.doubts(model, fit) if len(fit.free) else np.zeros(0)
+    if rows < STATED:
+        deviations = np.full(len(deviations), np.nan)
+    listed = []
+    for k, deviation in zip(fit.free, deviations, strict=True):
+        parameter = model.parameters[k]
+        listed.append((parameter.name, float(fit.p[k]), float(deviation), parameter.unit))
+    return listed
 
 
 def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterable[str] = ()) -> Array:
@@ -185,6 +190,7 @@ def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
 
 
 def _fixed_kinds(fix: Iterable[str]) -> set[str]:
+    """The kinds that stay as the file has them; UsageError if one is unknown or none is left."""
     fixed = {fix} if isinstance(fix, str) else set(fix)
     if unknown := sorted(fixed - set(KINDS)):
         raise UsageError(f"there is no kind {unknown[0]} of corrections; there are {', '.join(KINDS)}")
@@ -194,6 +200,7 @@ def _fixed_kinds(fix: Iterable[str]) -> set[str]:
 
 
 def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
+    """The rows, checked: UsageError for shapes that do not go together and numbers that are not finite."""
     c = as_joints(arm, q)
     values = arrays.real_array(measured, "measured")
     if c.ndim != 2:
@@ -209,6 +216,7 @@ def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
 
 
 def _must_explain(rows: Measurements, choice: Choice) -> None:
+    """Raise UsageError if the corrected arm misses half of the rows by too much of their spread."""
     spread = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
     left = float(np.median(choice.errors[choice.level]))
     enough = HOPELESS if len(rows) >= MANY_ROWS else 1.0  # few rows say little of rows they have not seen

@@ -36,6 +36,7 @@ def check_measurements(arm: Arm, data_rows: Measurements) -> None:
 
 
 def _check_motion(arm: Arm, rows: Measurements) -> None:
+    """Raise UsageError if a joint never moves, or all of them in step."""
     least = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
     still = np.flatnonzero(np.ptp(rows.c, axis=0) < least)
     if len(still):
@@ -54,6 +55,7 @@ def _check_motion(arm: Arm, rows: Measurements) -> None:
 
 
 def _check_spread(rows: Measurements) -> None:
+    """Raise UsageError if the measured points lie on a line."""
     centred = rows.position - np.median(rows.position, axis=0)
     # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
     near = np.argsort(np.linalg.norm(centred, axis=1))[: max(MIN_ROWS, math.ceil(0.8 * len(centred)))]
@@ -73,9 +75,9 @@ class _Reading(NamedTuple):
 
 
 def _check_readings(arm: Arm, rows: Measurements) -> None:
-    """Units and columns: whether another reading of the rows fits far better than the one given."""
+    """Raise UsageError if the rows fit far better in other units or with columns or signs changed."""
     expected = position(arm, rows.c)
-    size = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
+    size = _cloud_size(rows.position)
     miss, plain = _aligned_miss(expected, rows.position), _median_miss(expected, rows.position)
     says = ""
     if plain > FITS * size:
@@ -92,27 +94,20 @@ def _check_readings(arm: Arm, rows: Measurements) -> None:
 
 
 def _axes_in_place(expected: Array, measured: Array, most: float, largest: float) -> str:
-    """Whether the points fit without any motion once axes change places or one of them its sign; "" if not.
+    """Why points (M, 3) fit without any motion once axes change places or one of them its sign; "" if they do not.
 
     Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
     """
-    candidates = [
-        (
-            _median_miss(expected, measured[:, order]),
-            f"columns {_axis_names(order)} of the measured points look like x y z",
-        )
-        for order in itertools.permutations(range(3))
-        if order != (0, 1, 2)
-    ]
-    candidates += [
-        (
-            _median_miss(expected, measured * flip),
-            f"the measured {axis} looks negative (or the first joint turns the other way)",
-        )
-        for flip, axis in _FLIPS
-    ]
-    reading_miss, says = min(candidates)
-    return says if reading_miss < min(most, largest) else ""
+    candidates = []
+    for order in itertools.permutations(range(3)):
+        if order != (0, 1, 2):
+            explanation = f"columns {_axis_names(order)} of the measured points look like x y z"
+            candidates.append((_median_miss(expected, measured[:, order]), explanation))
+    for flip, axis in _FLIPS:
+        explanation = f"the measured {axis} looks negative (or the first joint turns the other way)"
+        candidates.append((_median_miss(expected, measured * flip), explanation))
+    least_miss, explanation = min(candidates)
+    return explanation if least_miss < min(most, largest) else ""
 
 
 _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "z"))
@@ -149,6 +144,7 @@ def _axis_names(order: tuple[int, ...]) -> str:
 
 
 def _cloud_size(x: Array) -> float:
+    """Median distance of points (M, 3) from their median."""
     return float(np.median(np.linalg.norm(x - np.median(x, axis=0), axis=1)))
 
 

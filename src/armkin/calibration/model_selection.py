@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.corrected_chain import KINDS, Model
+from armkin.calibration.corrected_chain import KINDS, Model, Parameter
 from armkin.calibration.observability import left_open
 from armkin.calibration.robust_fit import Fit, Measurements, fit_corrections, residuals
 from armkin.formula.arrays import Array
@@ -85,21 +85,20 @@ def _cross_validate(
             tick(level * count + part + 1, len(sets) * count)
             used = np.setdiff1d(np.arange(len(rows)), held)
             p = fit_corrections(model, rows.take(used), free, start, steps=12).p if len(free) else full_fit.p
-            errors[level, held] = np.linalg.norm(residuals(model, p, rows.take(held))[0], axis=1)
+            errors[level, held] = np.linalg.norm(residuals(model, p, rows.take(held)).position, axis=1)
     return fits, errors
 
 
 def free_at(model: Model, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level: its own kind's and the simpler levels'."""
     kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
-    is_free = [
-        parameter.kind in kinds
-        and not {parameter.kind, parameter.name} & set(fixed)
-        # points alone do not show how the measuring tip is turned
-        and not (parameter.kind == "tool" and parameter.unit == "rad" and rows.rotation is None)
-        for parameter in model.parameters
-    ]
-    return np.flatnonzero(is_free)
+
+    def is_free(parameter: Parameter) -> bool:
+        if parameter.kind == "tool" and parameter.unit == "rad" and rows.rotation is None:
+            return False  # points alone do not show how the measuring tip is turned
+        return parameter.kind in kinds and parameter.kind not in fixed and parameter.name not in fixed
+
+    return np.flatnonzero([is_free(parameter) for parameter in model.parameters])
 
 
 def _five_parts(count: int) -> list[NDArray[np.intp]]:

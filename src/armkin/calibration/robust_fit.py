@@ -7,6 +7,7 @@ that are far out are forgotten. What the rows do not show stays where the prior 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +32,8 @@ class Measurements:
 
     def take(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
         """Some of the rows."""
-        return Measurements(
-            self.c[selected], self.position[selected], None if self.rotation is None else self.rotation[selected]
-        )
+        rotation = None if self.rotation is None else self.rotation[selected]
+        return Measurements(self.c[selected], self.position[selected], rotation)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,15 +47,23 @@ class Fit:
     free: NDArray[np.intp]  # (F,)
 
 
-def residuals(model: Model, p: Array, rows: Measurements) -> tuple[Array, Array | None, Array]:
-    """What the model misses: (M, 3) [mm], (M, 3) [rad] or None, and the Jacobian (M, 6, P)."""
+class Residuals(NamedTuple):
+    """What the model misses, and how that depends on the corrections."""
+
+    position: Array  # (M, 3) [mm]
+    turn: Array | None  # (M, 3) [rad]; None where no rotations were measured
+    jacobian: Array  # (M, 6, P)
+
+
+def residuals(model: Model, p: Array, rows: Measurements) -> Residuals:
+    """What the model with corrections p (P,) misses of the rows."""
     T, J = model.poses(p, rows.c)
-    position_residuals = rows.position - T[:, :3, 3]
+    missed_position = rows.position - T[:, :3, 3]
     if rows.rotation is None:
-        return position_residuals, None, J
+        return Residuals(missed_position, None, J)
     # Half the sum of the columns' cross products is the rotation vector to third order.
-    turned = 0.5 * np.cross(T[:, :3, :3], rows.rotation, axis=1).sum(axis=2)
-    return position_residuals, turned, J
+    turn = 0.5 * np.cross(T[:, :3, :3], rows.rotation, axis=1).sum(axis=2)
+    return Residuals(missed_position, turn, J)
 
 
 def fit_corrections(
@@ -69,59 +77,55 @@ def fit_corrections(
     p = np.zeros(len(model.parameters)) if start is None else start.copy()
     prior = model.prior[free]
     damping = 1e-3
-    scale = (0.0, 0.0)
-    position_residuals, turned, J = residuals(model, p, rows)
-    held = 0.0  # numbers that the fit itself has used up
+    missed = residuals(model, p, rows)
+    fitted_numbers = 0.0  # numbers that the fit itself has used up
     for step in range(steps):
-        scale = scales(position_residuals, turned, held)
-        weight, weight_turn = weights(position_residuals, scale[0]), weights(turned, scale[1])
-        H, g = _normal_equations(J[:, :, free] * prior, position_residuals, turned, weight, weight_turn, scale)
+        scale = scales(missed.position, missed.turn, fitted_numbers)
+        H, g = _normal_equations(missed, scale, free, prior)
         z = p[free] / prior
-        cost = _cost(position_residuals, turned, scale, z)
+        cost = _cost(missed, scale, z)
         with_prior = H + np.eye(len(free))
-        held = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
-        better = False
+        fitted_numbers = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
         for _ in range(8):
             move = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), g - z)
             trial = p.copy()
             trial[free] += move * prior
-            trial_residuals = residuals(model, trial, rows)
-            if _cost(trial_residuals[0], trial_residuals[1], scale, z + move) <= cost:
-                better = True
+            trial_missed = residuals(model, trial, rows)
+            if _cost(trial_missed, scale, z + move) <= cost:
                 break
             damping = max(damping, 1e-6) * 10
-        if not better:
-            break
-        p, (position_residuals, turned, J) = trial, trial_residuals
+        else:
+            break  # no step lowers the cost
+        p, missed = trial, trial_missed
         damping *= 0.1
         if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
             break
-    scale = scales(position_residuals, turned, held)
-    weight, weight_turn = weights(position_residuals, scale[0]), weights(turned, scale[1])
-    H, _ = _normal_equations(J[:, :, free] * prior, position_residuals, turned, weight, weight_turn, scale)
-    return Fit(p, scale, np.minimum(weight, weight_turn), H + np.eye(len(free)), free)
+    scale = scales(missed.position, missed.turn, fitted_numbers)
+    H, _ = _normal_equations(missed, scale, free, prior)
+    row_weights = np.minimum(weights(missed.position, scale[0]), weights(missed.turn, scale[1]))
+    return Fit(p, scale, row_weights, H + np.eye(len(free)), free)
 
 
-def _cost(position_residuals: Array, rotation_residuals: Array | None, scale: tuple[float, float], z: Array) -> float:
-    return float(z @ z) + sum(
-        loss(r, s) for r, s in ((position_residuals, scale[0]), (rotation_residuals, scale[1])) if r is not None
-    )
+def _cost(missed: Residuals, scale: tuple[float, float], z: Array) -> float:
+    """What is minimised, of corrections z in units of the prior."""
+    parts = ((missed.position, scale[0]), (missed.turn, scale[1]))
+    return float(z @ z) + sum(loss(r, s) for r, s in parts if r is not None)
 
 
 def _normal_equations(
-    J: Array,
-    position_residuals: Array,
-    rotation_residuals: Array | None,
-    weight: Array,
-    weight_turn: Array,
-    scale: tuple[float, float],
+    missed: Residuals, scale: tuple[float, float], free: NDArray[np.intp], prior: Array
 ) -> tuple[Array, Array]:
-    """J^T W J and J^T W r in units of the prior and the scales, without the prior."""
-    rows = J[:, :3] * (np.sqrt(weight) / scale[0])[:, None, None]
-    values = position_residuals * (np.sqrt(weight) / scale[0])[:, None]
-    A, b = rows.reshape(values.size, J.shape[2]), values.reshape(-1)
-    if rotation_residuals is not None:
-        rows = J[:, 3:] * (np.sqrt(weight_turn) / scale[1])[:, None, None]
-        values = rotation_residuals * (np.sqrt(weight_turn) / scale[1])[:, None]
-        A, b = np.concatenate([A, rows.reshape(values.size, J.shape[2])]), np.concatenate([b, values.reshape(-1)])
+    """J^T W J and J^T W r of the free parameters, in units of the prior and the scales, without the prior."""
+    J = missed.jacobian[:, :, free] * prior
+    A, b = _weighted_equations(J[:, :3], missed.position, scale[0])
+    if missed.turn is not None:
+        A_turn, b_turn = _weighted_equations(J[:, 3:], missed.turn, scale[1])
+        A, b = np.concatenate([A, A_turn]), np.concatenate([b, b_turn])
     return A.T @ A, A.T @ b
+
+
+def _weighted_equations(J: Array, r: Array, scale: float) -> tuple[Array, Array]:
+    """Rows (3 M, F) and right sides (3 M,) of J x = r, each times the root of its weight, divided by the scale."""
+    factor = np.sqrt(weights(r, scale)) / scale
+    rows, values = J * factor[:, None, None], r * factor[:, None]
+    return rows.reshape(values.size, J.shape[2]), values.reshape(-1)

@@ -107,14 +107,12 @@ def _fit_calibration(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Ca
 def _file_text(calibration: Calibration, arm: Arm) -> str:
     from armkin.robot_file.robot_file_text import format_robot_file
 
-    return format_robot_file(
-        calibration.data,
-        [
-            f"{arm.name}, calibrated from {len(calibration.before)} measured poses by armkin calibrate.",
-            f"On rows not used: {calibration.rms('before'):.3f} mm rms before, "
-            f"{calibration.rms('after'):.3f} mm after.",
-        ],
-    )
+    before, after = calibration.rms("before"), calibration.rms("after")
+    heading = [
+        f"{arm.name}, calibrated from {len(calibration.before)} measured poses by armkin calibrate.",
+        f"On rows not used: {before:.3f} mm rms before, {after:.3f} mm after.",
+    ]
+    return format_robot_file(calibration.data, heading)
 
 
 def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
@@ -146,20 +144,25 @@ def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | N
         "rows": len(calibration.before),
         "level": calibration.level,
         "corrected": calibration.kinds,
-        **{
-            key: {
-                "median_mm": float(np.median(errors[used])),
-                "rms_mm": float(np.sqrt(np.mean(errors[used] ** 2))),
-                "max_mm": float(errors[used].max()),
-            }
-            for key, errors in (("before", calibration.before), ("after", calibration.after))
-        },
+        "before": _error_statistics(calibration.before[used]),
+        "after": _error_statistics(calibration.after[used]),
         "noise_mm": calibration.noise,
         "flagged": [{"row": numbers[k], "off_mm": float(calibration.after[k])} for k in calibration.flagged],
         "corrections": corrections,
         "unseen": calibration.unseen,
         "held": calibration.held,
         "out": out,
+    }
+
+
+def _error_statistics(errors: Array) -> dict[str, float]:
+    """Median, root mean square and maximum of errors (M,) [mm]."""
+    import numpy as np
+
+    return {
+        "median_mm": float(np.median(errors)),
+        "rms_mm": float(np.sqrt(np.mean(errors**2))),
+        "max_mm": float(errors.max()),
     }
 
 
