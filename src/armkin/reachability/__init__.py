@@ -15,6 +15,7 @@ reach_map.py       `reach`: all rings, in chunks, by any engine
 place_search.py    `place`: where to put an arm for given targets or a path; place_file.py: its columns
 place_targets.py   what an arm reaches from a place; place_arm.py: the arm there, among what stands with the targets
 place_upright.py   places of an arm whose joint 1 stands upright beside the base's axis: by the distance from it alone
+best_place.py      which of the places is best: by targets, margin, distance to joint limits
 place_branches.py  which branches carry a way of the tool from a place; place_path.py: its plan from the best ones
 kept_chunks.py     chunks of both, answered by an engine and kept beside a file
 """

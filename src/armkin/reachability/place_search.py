@@ -17,7 +17,6 @@ import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -36,7 +35,7 @@ from armkin.inverse.tasks.task import read_targets
 from armkin.model.lock_joints import unlock
 from armkin.model.units import TURN
 from armkin.reachability import kept_chunks, place_path
-from armkin.reachability.cell_answers import limit_margin
+from armkin.reachability.best_place import Room, best_place, limit_rooms, margins
 from armkin.reachability.place_arm import split_keep_outs
 from armkin.reachability.place_path import PathFromPlace
 from armkin.reachability.place_targets import (
@@ -56,7 +55,6 @@ if TYPE_CHECKING:
 
 MAX_PLACES = 10**7  # places, at most, of a search
 SOLVES, ANSWERS = 40_000, 10**7  # solves of a chunk where each place is solved; places of one where most are read off
-Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
 PLANS, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
 
 
@@ -197,7 +195,23 @@ def place_several(
     questions = [question._replace(solve=solve) for question in questions]
     grids = [_axes(question, settings["area"], settings["step"]) for question in questions]
     work_list = _chunks(questions, [axes for axes, _ in grids])
-    parts, done, total = _parts(questions, settings, out), 0, sum(len(chunk.positions) for chunk in work_list)
+    counts = _count_reached(questions, work_list, engine, _parts(questions, settings, out), progress)
+    places = []
+    for i, (question, grid, file) in enumerate(zip(questions, grids, paths, strict=True)):
+        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == i])
+        places.append(_place_result(question, *grid, mine, settings, file))
+    return places
+
+
+def _count_reached(
+    questions: Sequence[PlaceQuestion],
+    work_list: Sequence[PositionChunk],
+    engine: Engine,
+    parts: Parts | None,
+    progress: Callable[[int, int], None] | None,
+) -> dict[int, NDArray[np.int64]]:
+    """How many targets are reached from each position and yaw of a chunk (P K,), by the chunk's number."""
+    done, total = 0, sum(len(chunk.positions) for chunk in work_list)
     counts: dict[int, NDArray[np.int64]] = {}
     with kept_chunks.hold_parts(parts, len(work_list)):
         for number, columns in kept_chunks.chunk_tables(engine, count_chunk, questions, work_list, parts):
@@ -205,11 +219,7 @@ def place_several(
             done += len(work_list[number].positions)
             if progress is not None:
                 progress(done, total)
-    places = []
-    for i, (question, grid, file) in enumerate(zip(questions, grids, paths, strict=True)):
-        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == i])
-        places.append(_place_result(question, *grid, mine, settings, file))
-    return places
+    return counts
 
 
 def _chunks(questions: Sequence[PlaceQuestion], grids: Sequence[tuple[Array, Array]]) -> list[PositionChunk]:
@@ -231,12 +241,25 @@ def _place_result(
 ) -> Place:
     """The result of one arm; counts: (places,) targets reached from each of the grid, `inner` of it in the area."""
     every = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
-    margin, reached = _margins(every == len(question.targets), settings["step"])[inner], every[inner]
+    reached = every[inner]
+    margin = margins(every == len(question.targets), settings["step"])[inner]
     x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(question.yaws) * settings["yaw"]
-    room = _limit_rooms(question, x, y, yaws)
-    best = _best_place(room, reached, margin)
+    room = limit_rooms(question, x, y, yaws)
+    best = best_place(room, reached, margin)
     goals, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
-    place = Place(question.arm, x, y, yaws, question.z, reached, margin, len(question.targets), best, goals, none)
+    place = Place(
+        arm=question.arm,
+        x=x,
+        y=y,
+        yaw=yaws,
+        z=question.z,
+        reached=reached,
+        margin=margin,
+        of=len(question.targets),
+        best=best,
+        positions=goals,
+        postures=none,
+    )
     return _add_postures(question, place if file is None else _plan_best_places(question, place, file, room))
 
 
@@ -263,7 +286,7 @@ def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, roo
     tried: list[PathFromPlace] = []
     left = place.reached.copy()
     while left.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
-        i, j, k = _best_place(room, left, place.margin)
+        i, j, k = best_place(room, left, place.margin)
         xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
         tried.append(place_path.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
         left[i, j, k] = -1
@@ -271,7 +294,7 @@ def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, roo
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
     best = next((path.index for path in tried if path.plan is not None), None)
     if best is None:
-        best = _best_place(room, place.reached, place.margin)
+        best = best_place(room, place.reached, place.margin)
     return replace(place, best=best, planned=tuple(tried))
 
 
@@ -290,7 +313,18 @@ def _question(
     arm, around = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values, *_ = read_targets(task, targets)
-    return PlaceQuestion(arm, task, values, yaws, settings["yaw"], settings["z"], around, ways, spare, held)
+    return PlaceQuestion(
+        arm=arm,
+        task=task,
+        targets=values,
+        yaws=yaws,
+        step=settings["yaw"],
+        z=settings["z"],
+        obstacles=around,
+        ways=ways,
+        spare=spare,
+        values=held,
+    )
 
 
 def _parts(
@@ -342,55 +376,3 @@ def _position_blocks(question: PlaceQuestion, positions: Array) -> Iterator[Arra
 def count_chunk(questions: list[PlaceQuestion], chunk: PositionChunk) -> tuple[int, Table]:
     """How many targets are reached from each position and yaw: (P K,)."""
     return chunk.number, {"reached": reached_counts(questions[chunk.question], chunk.positions).ravel()}
-
-
-def _margins(good: NDArray[np.bool_], step: float) -> Array:
-    """Distance of each place (X, Y, K) to the nearest one, at the same yaw, that is not good; 0 for these."""
-    X, _, K = good.shape
-    distances = np.zeros(good.shape)
-    columns = np.arange(X)[:, None]
-    for k in range(K):
-        if not good[:, :, k].any():
-            continue
-        # along y, then across x: the lower envelope of parabolas, here tried row by row
-        rows = _depth_along_y(good[:, :, k])
-        distances[:, :, k] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
-    return distances
-
-
-def _depth_along_y(good: NDArray[np.bool_]) -> Array:
-    """How many places along y it is to the nearest one that is not good: (X, Y)."""
-    index = np.where(good, np.inf, np.arange(good.shape[1]))
-    ahead = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(good.shape[1])
-    behind = np.arange(good.shape[1]) - np.maximum.accumulate(np.where(good, -np.inf, index), axis=1)
-    return np.asarray(np.minimum(ahead, behind))
-
-
-def _best_place(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, int, int]:
-    """The place that reaches most, by the greatest margin, then by the greatest distance to a joint limit."""
-    most = reached == reached.max()
-    tied = np.argwhere(most & (margin >= margin[most].max() - 1e-9))
-    if len(tied) > 1 and reached.max():
-        spread = tied[:: max(len(tied) // 200, 1)]  # some of very many alike are enough
-        tied = spread[int(np.argmax([room(*index) for index in spread.tolist()])) :]
-    i, j, k = tied[0].tolist()
-    return i, j, k
-
-
-def _limit_rooms(question: PlaceQuestion, x: Array, y: Array, yaws: Array) -> Room:
-    """`_limit_room` of places by their index, each asked once."""
-
-    @cache
-    def room(i: int, j: int, k: int) -> float:
-        return _limit_room(question, np.array([x[i], y[j]]), float(yaws[k]))
-
-    return room
-
-
-def _limit_room(question: PlaceQuestion, position: Array, turn: float) -> float:
-    """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
-    question = at_value(question, position, turn)
-    s, legal = free_from(question, position, turn)
-    margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
-    reached_margins = margins[np.isfinite(margins)]
-    return float(reached_margins.min()) if len(reached_margins) else 0.0

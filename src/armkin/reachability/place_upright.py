@@ -29,7 +29,7 @@ ROUNDING = 1e-6  # distance [rad, mm, reaches] from a limit, or from being there
 
 
 class Radii(NamedTuple):
-    """Branches of T targets in C cells between radii that are `spacing` [mm].
+    """Branches of T targets in C cells between radii that are `spacing` [mm] apart.
 
     first: (T, B, C) joint 1 [rad] at azimuth 0. sure, open: (T, B, C) how far [rad] it may be from the middle of its
     limits, so that the branch is legal anywhere in the cell, or may be; below 0: nowhere.
@@ -40,6 +40,26 @@ class Radii(NamedTuple):
     sure: Array
     open: Array
 
+    def of_target(self, i: int) -> Radii:
+        """The branches (B, C) of one target."""
+        return Radii(self.spacing, self.first[i], self.sure[i], self.open[i])
+
+
+class Feet(NamedTuple):
+    """Joint 1's foot [mm] and the yaw [rad] at every place and yaw: (P K,)."""
+
+    x: Array
+    y: Array
+    yaw: Array
+
+
+class Answers(NamedTuple):
+    """What a target is answered from some of the feet, by their numbers (k,): reached, or to be asked (k,)."""
+
+    feet: NDArray[np.intp]
+    reached: NDArray[np.bool_]
+    to_ask: NDArray[np.bool_]
+
 
 def by_radius(
     arm: Arm, task: str, targets: Array, place: Array, turns: Array
@@ -48,39 +68,52 @@ def by_radius(
     which of the rest have to be asked; None for an arm without a closed form."""
     N, K = len(targets), len(turns)
     legal, open_cases = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
-    c, s = np.cos(turns), np.sin(turns)
-    x, y = arm.link[0][:2, 3]
-    foot_x = (place[:, :1] + (c * x - s * y)).ravel()
-    foot_y = (place[:, 1:] + (s * x + c * y)).ravel()
-    yaw = np.tile(turns, len(place))
-    middle, up = _range_middle(arm, 0), 1.0 if arm.link[0][2, 2] > 0 else -1.0
+    feet = _feet(arm, place, turns)
     for start in range(0, N, AT_ONCE):
         block = targets[start : start + AT_ONCE]
-        if (table := _radii(arm, task, block)) is None:
+        if (radii := _radii(arm, task, block)) is None:
             return None
         for i, target in enumerate(block):
-            dx, dy = target[0] - foot_x, target[1] - foot_y
-            cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / table.spacing), RADII).astype(np.int32)
-            open_ = np.append((table.open[i] >= 0.0).any(axis=0), False)
-            near = np.flatnonzero(open_.take(cell))
-            cells = cell.take(near)
-            angle = np.arctan2(dy.take(near), dx.take(near))
-            angle -= yaw.take(near)
-            angle *= up
-            angle -= middle
-            yes, maybe = np.zeros(len(near), bool), np.zeros(len(near), bool)
-            for first, sure, most in zip(table.first[i], table.sure[i], table.open[i], strict=True):
-                if (most < 0.0).all():
-                    continue
-                away = first.take(cells)
-                away += angle
-                away -= TURN * np.rint(away * (1.0 / TURN))
-                away = np.abs(away, out=away)
-                yes |= away <= sure.take(cells)
-                maybe |= away <= most.take(cells)
-            legal[start + i, near], open_cases[start + i, near] = yes, maybe & ~yes
+            answers = _answers_from_feet(arm, radii.of_target(i), target, feet)
+            legal[start + i, answers.feet], open_cases[start + i, answers.feet] = answers.reached, answers.to_ask
     shape = (N, len(place), K)
     return legal.reshape(shape).transpose(1, 0, 2), open_cases.reshape(shape).transpose(1, 0, 2)
+
+
+def _feet(arm: Arm, place: Array, turns: Array) -> Feet:
+    """Joint 1's foot at places (P, 2) and yaws (K,)."""
+    c, s = np.cos(turns), np.sin(turns)
+    x, y = arm.link[0][:2, 3]
+    return Feet(
+        x=(place[:, :1] + (c * x - s * y)).ravel(),
+        y=(place[:, 1:] + (s * x + c * y)).ravel(),
+        yaw=np.tile(turns, len(place)),
+    )
+
+
+def _answers_from_feet(arm: Arm, branches: Radii, target: Array, feet: Feet) -> Answers:
+    """What is read off the target's branches, by each foot's distance and joint 1's azimuth there; elsewhere: none."""
+    dx, dy = target[0] - feet.x, target[1] - feet.y
+    every_cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / branches.spacing), RADII).astype(np.int32)
+    is_open = np.append((branches.open >= 0.0).any(axis=0), False)
+    near = np.flatnonzero(is_open.take(every_cell))
+    cell = every_cell.take(near)
+    # joint 1, from the middle of its limits, for a branch that has it at 0 where the azimuth is 0
+    angle = np.arctan2(dy.take(near), dx.take(near))
+    angle -= feet.yaw.take(near)
+    angle *= 1.0 if arm.link[0][2, 2] > 0 else -1.0
+    angle -= _range_middle(arm, 0)
+    reached, possible = np.zeros(len(near), bool), np.zeros(len(near), bool)
+    for first, sure, most in zip(branches.first, branches.sure, branches.open, strict=True):
+        if (most < 0.0).all():
+            continue
+        away = first.take(cell)
+        away += angle
+        away -= TURN * np.rint(away * (1.0 / TURN))
+        away = np.abs(away, out=away)
+        reached |= away <= sure.take(cell)
+        possible |= away <= most.take(cell)
+    return Answers(near, reached, possible & ~reached)
 
 
 def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:

@@ -139,24 +139,30 @@ def reach(
     ('arcs', 744, 200)
     """
     started = time.perf_counter()
-    question = CellQuestion(
-        Grid(arm, float(grid), int(azimuths), int(directions), int(rolls), bool(tool_down)), measures
+    cells = Grid(
+        arm=arm,
+        step=float(grid),
+        azimuths=int(azimuths),
+        directions=int(directions),
+        rolls=int(rolls),
+        tool_down=bool(tool_down),
     )
+    question = CellQuestion(cells, measures)
     rings = question.grid.rings
     if not len(rings):
         raise UsageError(f"grid: {grid:g} mm: no cell within a reach of {arm.reach:.0f} mm; take a finer grid")
     run = _Run(question, None if out is None else os.fspath(out), Engine(workers, cluster), progress)
     columns = run.answer_all(list(chunks(question)))
     return Reach(
-        question.grid,
-        columns,
-        "arcs" if question.by_arcs else "poses",
-        len(rings) * question.grid.azimuths,
-        len(rings) * question.grid.azimuths * question.grid.orientations,
-        run.solves,
-        run.reached,
-        run.volume,
-        time.perf_counter() - started,
+        grid=question.grid,
+        columns=columns,
+        method="arcs" if question.by_arcs else "poses",
+        cells=len(rings) * question.grid.azimuths,
+        answers=len(rings) * question.grid.azimuths * question.grid.orientations,
+        solves=run.solves,
+        reached=run.reached,
+        volume_mm3=run.volume,
+        seconds=time.perf_counter() - started,
     )
 
 

@@ -15,13 +15,13 @@ from armkin.motors import joints_per_pulse, motor_names, pulse_units
 from armkin.view.skeleton import arm_shape
 
 if TYPE_CHECKING:
+    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
 
 def scene_json(arm: Arm) -> dict[str, Any]:
     """The arm: links and bodies (see `armkin.view.skeleton.arm_shape`), joints, motors."""
     form = arm_shape(arm)
-    limits = [[units.finite_or_none(end) for end in pair] for pair in units.limits_out(arm)]
     return {
         "robot": arm.name,
         "robot_file": arm.path,
@@ -29,30 +29,7 @@ def scene_json(arm: Arm) -> dict[str, Any]:
         "base": arm.base.tolist(),
         "links": arm.link.tolist(),
         "bodies": [body.tolist() for body in form.bodies],
-        "joints": [
-            {
-                "name": name,
-                "unit": unit,
-                "lower": low,
-                "upper": high,
-                "home": home,
-                "prismatic": bool(sliding),
-                "ratio": float(ratio),
-                "at": float(offset),
-                "step": step,
-            }
-            for name, unit, (low, high), home, sliding, ratio, offset, step in zip(
-                arm.joint_names,
-                units.unit_names(arm),
-                limits,
-                units.home_out(arm),
-                arm.prismatic,
-                arm.ratio,
-                form.joint_offsets,
-                _joint_steps(arm),
-                strict=True,
-            )
-        ],
+        "joints": _joints_json(arm, form.joint_offsets),
         "poses": units.poses_out(arm),
         "obstacles": _obstacle_triangles(arm),
         **_motors_json(arm),
@@ -60,6 +37,26 @@ def scene_json(arm: Arm) -> dict[str, Any]:
         "lock": first_lock(arm),
         "locks": arm.n > 6 or first_lock(arm) is not None,
     }
+
+
+def _joints_json(arm: Arm, offsets: Array) -> list[dict[str, Any]]:
+    """Each joint's name, limits, home and step [deg | mm]; offsets: (n,) [mm] where on its own axis it sits."""
+    names, home, steps = units.unit_names(arm), units.home_out(arm), _joint_steps(arm)
+    joints = []
+    for i, (low, high) in enumerate(units.limits_out(arm)):
+        joint = {
+            "name": arm.joint_names[i],
+            "unit": names[i],
+            "lower": units.finite_or_none(low),
+            "upper": units.finite_or_none(high),
+            "home": home[i],
+            "prismatic": bool(arm.prismatic[i]),
+            "ratio": float(arm.ratio[i]),
+            "at": float(offsets[i]),
+            "step": steps[i],
+        }
+        joints.append(joint)
+    return joints
 
 
 def first_lock(arm: Arm) -> str | None:
@@ -86,9 +83,8 @@ def _obstacle_triangles(arm: Arm) -> list[float]:
         return []
     from armkin.keep_out.body_pairs import guard
 
-    return [
-        x for _, obstacle in guard(arm).obstacles for x in obstacle.triangles(1.4 * arm.reach).round(2).ravel().tolist()
-    ]
+    surfaces = [obstacle.triangles(1.4 * arm.reach) for _, obstacle in guard(arm).obstacles]
+    return [number for triangles in surfaces for number in triangles.round(2).ravel().tolist()]
 
 
 def tip_jog_axes(arm: Arm) -> list[str]:
@@ -102,6 +98,7 @@ def tip_jog_axes(arm: Arm) -> list[str]:
 
 
 def _motors_json(arm: Arm) -> dict[str, Any]:
+    """The motors' names and units; without drives None, and why."""
     try:
         joints_per_pulse(arm)
     except UsageError as error:
@@ -111,6 +108,7 @@ def _motors_json(arm: Arm) -> dict[str, Any]:
 
 
 def _gripper_json(arm: Arm) -> dict[str, Any] | None:
+    """How far the gripper opens, and which way it points in the tool's frame; None without one."""
     file = arm.gripper
     if file is None:
         return None

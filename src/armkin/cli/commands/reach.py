@@ -46,8 +46,8 @@ def reach(
     step, ring = number(grid, "--grid"), whole_number(azimuths, "--azimuths", 1, MAX_CELLS)
     direction_count = whole_number(directions, "--directions", 1, MAX_CELLS)
     turns = whole_number(rolls, "--rolls", 1, MAX_CELLS)
-    cells = len(Grid(arm, step, ring, direction_count, turns, tool_down).rings) * ring
-    with output.progress("cells", cells) as tick:
+    cells = Grid(arm=arm, step=step, azimuths=ring, directions=direction_count, rolls=turns, tool_down=tool_down)
+    with output.progress("cells", len(cells.rings) * ring) as tick:
         reach_map = armkin.reach(
             arm,
             grid=step,
