@@ -135,7 +135,15 @@ def answer_piece(job: Job, piece: Piece) -> Done:
     elif piece.values is not None and problem is None:
         tally.skipped = len(piece.values) - tally.rows
     near = getattr(job.questions, "near", None)
-    finished = Done(piece.number, piece.digest(), b"".join(encoded_parts), heading, tally, problem, near)
+    finished = Done(
+        number=piece.number,
+        input=piece.digest(),
+        data=b"".join(encoded_parts),
+        heading=heading,
+        tally=tally,
+        problem=problem,
+        near=near,
+    )
     if job.parts is None or problem is not None:
         return finished
     job.parts.keep(finished.number, finished.about(), finished.data)

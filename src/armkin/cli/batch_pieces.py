@@ -104,7 +104,14 @@ class Rows:
             for block in csv_to_numbers.text_blocks(file, source):
                 columns = copy.copy(learner)
                 columns.skipped = 0
-                yield Piece(number, first, csv_to_numbers.name_of(source), self.names, block, columns)
+                yield Piece(
+                    number=number,
+                    first=first,
+                    source=csv_to_numbers.name_of(source),
+                    names=self.names,
+                    lines=block,
+                    columns=columns,
+                )
                 for i, line in enumerate([] if learner.first_row_read else block.split(b"\n"), first):
                     if learner.first_row_read:
                         break

@@ -73,14 +73,14 @@ def _of_target(arm: Arm, target: str, target_options: TargetOptions) -> Goals:
     rounding = printed_rounding(label_units(chosen_task.labels), values, arm.reach, shown)
     held = lock_and_sweep.locked_values(arm, target_options.lock)
     return Goals(
-        None,
-        [1],
-        targets_in(chosen_task.labels, values),
-        chosen_task.name,
-        target_options.branch,
-        held,
-        close,
-        rounding,
+        joints=None,
+        rows=[1],
+        target=targets_in(chosen_task.labels, values),
+        task=chosen_task.name,
+        branch=target_options.branch,
+        held=held,
+        near=close,
+        rounding=rounding,
     )
 
 

@@ -59,12 +59,11 @@ def branch_columns(
         within = within & ~limits.outside_limits(arm, q).any(axis=-1)
     free = within & s.clear if arm.keep_out else within
     names = () if request.branch is None else find_branches(s.names, request.branch)
-    parts = [
-        _list_branches(
-            request, _Answers(s, slice(i, i + BLOCK_TARGETS), q, within, free, near, names), rows, all_branches, quick
-        )
-        for i in range(0, max(len(q), 1), BLOCK_TARGETS)
-    ]
+    parts = []
+    for i in range(0, max(len(q), 1), BLOCK_TARGETS):
+        block = slice(i, i + BLOCK_TARGETS)
+        answers = _Answers(s=s, rows=block, q=q, within_limits=within, free=free, near=near, names=names)
+        parts.append(_list_branches(request, answers, rows, all_branches, quick))
     return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 
 

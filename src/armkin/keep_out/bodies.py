@@ -68,13 +68,13 @@ def bodies(arm: Arm) -> Bodies:
         *_base_segments(arm), *(s for i in range(arm.n) for s in _link_segments(arm, i)), strict=True
     )
     return Bodies(
-        (BASE, *arm.joint_names),
-        np.where(assumed, ASSUMED * arm.reach, radii),
-        assumed,
-        np.array(owner),
-        np.array(begin),
-        np.array(end),
-        np.array(slide),
+        names=(BASE, *arm.joint_names),
+        radius=np.where(assumed, ASSUMED * arm.reach, radii),
+        assumed=assumed,
+        owner=np.array(owner),
+        begin=np.array(begin),
+        end=np.array(end),
+        slide=np.array(slide),
     )
 
 

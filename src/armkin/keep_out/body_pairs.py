@@ -165,16 +165,16 @@ def _guard_of_pairs(
     listed = [Pair(k, None, name) for name, _ in obstacles for k in solid]
     listed += [Pair(later, earlier, form.names[earlier]) for later, earlier in pairs]
     return Guard(
-        arm,
-        form,
-        obstacles,
-        tuple(listed),
-        left_out,
-        moving,
-        np.flatnonzero(np.diff(form.owner[moving], prepend=-1)),
-        flat[:, 0],
-        flat[:, 1],
-        np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.empty(0, np.intp),
+        arm=arm,
+        bodies=form,
+        obstacles=obstacles,
+        pairs=tuple(listed),
+        left_out=left_out,
+        moving=moving,
+        first=np.flatnonzero(np.diff(form.owner[moving], prepend=-1)),
+        ours=flat[:, 0],
+        theirs=flat[:, 1],
+        starts=np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.empty(0, np.intp),
     )
 
 

@@ -56,7 +56,7 @@ def prove_motion(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: 
     too near to begin with, by default those that are.
     """
     if not guard.pairs:
-        return Proof(True, 0.0, None, np.inf, (), 0)
+        return Proof(free=True, place=0.0, pair=None, mm=np.inf, escaping=(), postures=0)
     places = np.unique(np.round(np.linspace(0.0, way.cells, min(way.cells, _FIRST) + 1)))
     q = way.joints_at(places)
     slide_out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
@@ -138,16 +138,42 @@ class _Round:
         if self.stuck < count:
             pair = int(np.argmin(self.lacking[self.stuck]))
             least_clearance = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
-            return Proof(False, float(self.places[self.stuck]), pair, least_clearance, escaping, count)
+            return Proof(
+                free=False,
+                place=float(self.places[self.stuck]),
+                pair=pair,
+                mm=least_clearance,
+                escaping=escaping,
+                postures=count,
+            )
         if self.hit < count:
             pair = int(np.argmin(self.clearances[self.hit]))
             return Proof(
-                False, float(self.places[self.hit]), pair, float(self.clearances[self.hit, pair]), escaping, count
+                free=False,
+                place=float(self.places[self.hit]),
+                pair=pair,
+                mm=float(self.clearances[self.hit, pair]),
+                escaping=escaping,
+                postures=count,
             )
         bound = np.where(self.start, np.inf, self.bound)
         if not len(bound) or not np.isfinite(bound).any():
             pair = int(np.argmin(self.clearances[0]))
-            return Proof(True, 0.0, pair, float(self.clearances[:, pair].min()), escaping, count)
+            return Proof(
+                free=True,
+                place=0.0,
+                pair=pair,
+                mm=float(self.clearances[:, pair].min()),
+                escaping=escaping,
+                postures=count,
+            )
         row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
         nearer = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
-        return Proof(True, float(self.places[nearer]), pair, float(bound[row, pair]), escaping, count)
+        return Proof(
+            free=True,
+            place=float(self.places[nearer]),
+            pair=pair,
+            mm=float(bound[row, pair]),
+            escaping=escaping,
+            postures=count,
+        )

@@ -156,13 +156,13 @@ class Actions:
             count = len(target) if isinstance(target, list) and len(target) <= 6 else 6
             target = request_checks.number_list_field(fields, "target", count)
         return Question(
-            q,
-            target,
-            tuple(name for name in arm.joint_names if name in held),
-            request_checks.text_field(fields, "branch") if fields.get("branch") is not None else "",
-            request_checks.flag_field(fields, "best"),
-            request_checks.flag_field(fields, "nearest"),
-            self.standing_pulses(),
+            q=q,
+            target=target,
+            held=tuple(name for name in arm.joint_names if name in held),
+            branch=request_checks.text_field(fields, "branch") if fields.get("branch") is not None else "",
+            best=request_checks.flag_field(fields, "best"),
+            nearest=request_checks.flag_field(fields, "nearest"),
+            standing_pulses=self.standing_pulses(),
         )
 
     def standing_pulses(self) -> tuple[int, ...] | None:

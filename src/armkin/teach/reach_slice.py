@@ -40,7 +40,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
         reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTION_COUNT, rolls=1, measures=False)
         grid, shares, values = reach_map.grid, reach_map.columns["share"], 0
     else:
-        grid = Grid(real_arm, step, 2, DIRECTION_COUNT, 1, False)
+        grid = Grid(arm=real_arm, step=step, azimuths=2, directions=DIRECTION_COUNT, rolls=1, tool_down=False)
         values_held = _held_values(real_arm, free)
         shares, values = _reached_shares(grid, free, values_held), len(values_held)
     plane = voxels.section_layer(grid)

@@ -134,7 +134,9 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
         edits["joints", j, "drive", "zero"] = _int_if_whole(zero_count)
         edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
     jaw, ends = _gripper_calibration(arm, calibrated, path, edits)
-    return ServoCalibration(tuple(motors), tuple(zero), tuple(limits), jaw, ends, edits)
+    return ServoCalibration(
+        motors=tuple(motors), zero=tuple(zero), limits=tuple(limits), gripper=jaw, gripper_ends=ends, edits=edits
+    )
 
 
 def _calibrated_motor(

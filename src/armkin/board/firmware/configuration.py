@@ -66,13 +66,13 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
             _check_servo(f"motor {motor.name}", low[k], high[k])
         stepper = motor.kind == "stepper"
         images[axis] = AxisImage(
-            True,
-            motor.invert and stepper,  # a servo's is in its counts
-            low[k],
-            high[k],
-            int(home[k]),
-            _board_rate(board, rate[k]),
-            _board_accel(accel[k]),
+            used=True,
+            invert=motor.invert and stepper,  # a servo's is in its counts
+            lower=low[k],
+            upper=high[k],
+            home=int(home[k]),
+            max_rate=_board_rate(board, rate[k]),
+            max_accel=_board_accel(accel[k]),
         )
     if grip is not None and arm.gripper is not None:
         images[grip.axis] = _grip_image(board, arm.gripper, grip)
@@ -129,7 +129,16 @@ def _rehearsal_board(arm: Arm) -> Board:
     if arm.gripper is not None:
         (servos if arm.gripper.kind == "servo" else steppers).append("gripper")
     switches = dict.fromkeys(homing.switch for homing in arm.homing if homing is not None)
-    return Board("sim", 0, tuple(steppers), tuple(servos), tuple(switches), 128, 240, 129)
+    return Board(
+        kind="sim",
+        number=0,
+        steppers=tuple(steppers),
+        servos=tuple(servos),
+        switches=tuple(switches),
+        queue=128,
+        frame=240,
+        min_interval=129,
+    )
 
 
 def _count_limits(arm: Arm) -> tuple[list[int], list[int]]:
@@ -234,7 +243,15 @@ def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
     if gripper.kind == "servo":
         _check_servo("the gripper", low, high)
     invert = gripper.invert and gripper.kind == "stepper"
-    return AxisImage(True, invert, low, high, grip.open, _board_rate(board, grip.top), _board_accel(grip.accel))
+    return AxisImage(
+        used=True,
+        invert=invert,
+        lower=low,
+        upper=high,
+        home=grip.open,
+        max_rate=_board_rate(board, grip.top),
+        max_accel=_board_accel(grip.accel),
+    )
 
 
 def _pulse_timing(arm: Arm) -> Driver:

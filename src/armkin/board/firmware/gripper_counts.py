@@ -42,12 +42,20 @@ def as_axis(axis: int, gripper: Gripper) -> Grip:
         zero = -gripper.open * per_unit  # steps are counted from the open gripper
     top, accel = gripper.max_speed, gripper.max_accel
     bare = Grip(
-        axis,
-        0,
-        0,
-        None if top is None else top * abs(per_unit),
-        None if accel is None else accel * abs(per_unit),
-        per_unit,
-        zero,
+        axis=axis,
+        open=0,
+        closed=0,
+        top=None if top is None else top * abs(per_unit),
+        accel=None if accel is None else accel * abs(per_unit),
+        per_unit=per_unit,
+        at_zero=zero,
     )
-    return Grip(axis, bare.count(gripper.open), bare.count(gripper.closed), bare.top, bare.accel, per_unit, zero)
+    return Grip(
+        axis=axis,
+        open=bare.count(gripper.open),
+        closed=bare.count(gripper.closed),
+        top=bare.top,
+        accel=bare.accel,
+        per_unit=per_unit,
+        at_zero=zero,
+    )

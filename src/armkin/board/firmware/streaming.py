@@ -194,7 +194,15 @@ def motion_batches(
             segments = list(islice(source, 1))
         places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
         end = [p // protocol.STEP for p in places]
-        yield MotionFrame([axes[k] for k in moving], begin_counts, end, part, not segments, clock, move.brake)
+        yield MotionFrame(
+            axes=[axes[k] for k in moving],
+            start=begin_counts,
+            end=end,
+            segments=part,
+            at_rest=not segments,
+            clock=clock,
+            brake=move.brake,
+        )
         begin_counts = end
 
 

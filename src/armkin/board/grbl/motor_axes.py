@@ -28,7 +28,17 @@ def axes_of(arm: Arm) -> list[Axis]:
                 f"{arm.path or arm.name}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with "
                 f"three decimals, enough for {COARSE_STEPS:g} steps a unit at most"
             )
-        axes.append(Axis(motor.axis, name, steps, motor.invert, speed, accel, _is_upward(arm, k)))
+        axes.append(
+            Axis(
+                letter=motor.axis,
+                name=name,
+                steps=steps,
+                invert=motor.invert,
+                max_speed=speed,
+                max_accel=accel,
+                upward=_is_upward(arm, k),
+            )
+        )
     return axes
 
 

@@ -74,7 +74,14 @@ def parse_report(line: str) -> Report | None:
         free = [int(value) for value in _parse_values(field_of["Bf"])] if "Bf" in field_of else None
         room = (free[0], free[1]) if free else None
         feed = int(_parse_values(field_of["Ov"])[0]) if "Ov" in field_of else None
-        return Report(state, int(_parse_value(detail or "0")), position, room, field_of.get("Pn", ""), feed)
+        return Report(
+            state=state,
+            detail=int(_parse_value(detail or "0")),
+            position=position,
+            free=room,
+            pins=field_of.get("Pn", ""),
+            feed=feed,
+        )
     except (ValueError, IndexError):
         return None
 

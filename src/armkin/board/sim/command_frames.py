@@ -154,7 +154,17 @@ class Commands:
         if not any(rate) or switch >= len(self._board.switches) or flags > 1 or not slow or not backoff or far:
             raise RefusedError(Error.VALUE)
         self._check_rates(rate, jogging=False)
-        self._motors.home(Search(switch, bool(flags), slow / 256, backoff, travel, time / 10, rate))
+        self._motors.home(
+            Search(
+                switch=switch,
+                closed=bool(flags),
+                slow=slow / 256,
+                backoff=backoff,
+                travel=travel,
+                time=time / 10,
+                rate=rate,
+            )
+        )
 
     def _jog(self, payload: bytes) -> None:
         n = len(self._board.axes)

@@ -74,7 +74,10 @@ def fk(
         "compiled": compiled,
     }
     questions = FkQuestions(arm, frames, compiled)
-    BatchRun(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
+    batch_run = BatchRun(
+        questions=questions, out=out, as_json=json, workers=workers, cluster=cluster, resume=resume, settings=identity
+    )
+    batch_run.run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)

@@ -68,7 +68,10 @@ def pulses(
     rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
     questions = PulseQuestions(arm, origin, best)
-    BatchRun(questions, out, json, workers, cluster, resume, identity).run(rows).conclude(questions.unsolvable)
+    batch_run = BatchRun(
+        questions=questions, out=out, as_json=json, workers=workers, cluster=cluster, resume=resume, settings=identity
+    )
+    batch_run.run(rows).conclude(questions.unsolvable)
 
 
 @dataclass(frozen=True)

@@ -54,14 +54,14 @@ class Columns:
     def pad_to(self, B: int) -> Columns:
         """The samples with B columns of branches at least."""
         return Columns(
-            self.s,
-            _pad(self.q, B),
-            _pad(self.name, B, -1),
-            self.status,
-            _pad(self.within_limits, B, 0),
-            self.names,
-            self.complete,
-            _pad(self.partner, B, -1),
+            s=self.s,
+            q=_pad(self.q, B),
+            name=_pad(self.name, B, -1),
+            status=self.status,
+            within_limits=_pad(self.within_limits, B, 0),
+            names=self.names,
+            complete=self.complete,
+            partner=_pad(self.partner, B, -1),
         )
 
     def insert_rows(self, rows: Int, new: Columns) -> Columns:
@@ -70,14 +70,14 @@ class Columns:
         padded, new = self.pad_to(B), new.pad_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
         return Columns(
-            np.insert(padded.s, rows, new.s),
-            np.insert(padded.q, rows, new.q, axis=0),
-            np.insert(padded.name, rows, new.name, axis=0),
-            np.insert(padded.status, rows, new.status),
-            np.insert(padded.within_limits, rows, new.within_limits, axis=0),
-            padded.names,
-            padded.complete and new.complete,
-            np.insert(padded.partner, rows, links, axis=0),
+            s=np.insert(padded.s, rows, new.s),
+            q=np.insert(padded.q, rows, new.q, axis=0),
+            name=np.insert(padded.name, rows, new.name, axis=0),
+            status=np.insert(padded.status, rows, new.status),
+            within_limits=np.insert(padded.within_limits, rows, new.within_limits, axis=0),
+            names=padded.names,
+            complete=padded.complete and new.complete,
+            partner=np.insert(padded.partner, rows, links, axis=0),
         )
 
 
@@ -167,13 +167,13 @@ def _concatenate(parts: list[Columns]) -> Columns:
     B = max(part.q.shape[1] for part in parts)
     padded = [part.pad_to(B) for part in parts]
     return Columns(
-        np.concatenate([part.s for part in padded]),
-        np.concatenate([part.q for part in padded]),
-        np.concatenate([part.name for part in padded]),
-        np.concatenate([part.status for part in padded]),
-        np.concatenate([part.within_limits for part in padded]),
-        max((part.names for part in parts), key=len),
-        all(part.complete for part in parts),
+        s=np.concatenate([part.s for part in padded]),
+        q=np.concatenate([part.q for part in padded]),
+        name=np.concatenate([part.name for part in padded]),
+        status=np.concatenate([part.status for part in padded]),
+        within_limits=np.concatenate([part.within_limits for part in padded]),
+        names=max((part.names for part in parts), key=len),
+        complete=all(part.complete for part in parts),
     )
 
 
@@ -193,7 +193,9 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
         q[misplaced[row], number] = old_q[row, column]
         name[misplaced[row], number] = number
         within_limits[misplaced[row], number] = old_within[row, column]
-    return Columns(s, q, name, status, within_limits, solutions.names, complete)
+    return Columns(
+        s=s, q=q, name=name, status=status, within_limits=within_limits, names=solutions.names, complete=complete
+    )
 
 
 def _pad(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]

@@ -190,7 +190,7 @@ def run_stretches(
         samples = slice(max(int(np.searchsorted(s, begin, side="right")) - 1, 0), int(np.searchsorted(s, end)) + 1)
         solved = len(s[samples])  # a route of many turns has more samples, and needs more points
         number = max(int(grid * (end - begin) / route.length), solved * grid // (2 * _MIN_GRID_POINTS), 60)
-        way = Way(route, s[samples], q[samples], begin, end, run.chain.windows, inner)
+        way = Way(route=route, s=s[samples], q=q[samples], begin=begin, end=end, windows=run.chain.windows, stops=inner)
         path, deviations = refine_grid(arm, way, number, tolerance)
         _check_deviation(path, deviations + route.largest_detour, pace)
         if stretches:  # consecutive stretches share the posture at rest exactly

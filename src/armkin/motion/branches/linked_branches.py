@@ -37,7 +37,7 @@ def link_branches(
 
     targets: lengths (N,) to targets; near: joint values for joints that are free.
     """
-    work = _Linking(arm, targets, task, tolerance, near, float(s[-1]))
+    work = _Linking(arm=arm, targets=targets, task=task, tolerance=tolerance, near=near, length=float(s[-1]))
     work.start(s)
     work.settle()
     return work.columns
@@ -89,7 +89,14 @@ class _Linking:
             return
         rows = np.stack([np.maximum(steps - 1, 0), steps, steps + 1], axis=1).ravel()
         samples = self.samples
-        part = _Linking(samples.arm, samples.targets, samples.task, self.tolerance, samples.near, self.length)
+        part = _Linking(
+            arm=samples.arm,
+            targets=samples.targets,
+            task=samples.task,
+            tolerance=self.tolerance,
+            near=samples.near,
+            length=self.length,
+        )
         part.samples = samples
         part.columns = columns.take_rows(rows)
         part.columns.partner = columns.partner[rows[:-1]]

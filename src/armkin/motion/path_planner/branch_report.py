@@ -94,14 +94,14 @@ def _reconfiguration_at(arm: Arm, columns: Columns, chain: Chain, first: int, of
     q = chain.q[min(last_sample + 1, chain.last) - chain.first].copy() if reason == "hit" else None
     hit_words = "" if q is None else hit_text(arm, q)
     return Reconfiguration(
-        offset + float(columns.s[last_sample]),
-        reason,
-        None if joint is None else arm.joint_names[joint],
-        joint,
-        value,
-        status_beyond,
-        hit_words,
-        q,
+        s=offset + float(columns.s[last_sample]),
+        why=reason,
+        joint=None if joint is None else arm.joint_names[joint],
+        index=joint,
+        value=value,
+        beyond=status_beyond,
+        hit=hit_words,
+        joints=q,
     )
 
 

@@ -82,7 +82,20 @@ def path(
     [390.0, -80.0, 300.0]
     """
     request = PathRequest(
-        start, near, branch, task, tolerance, corners, blend, speed, accel, tool_speed, jerk, hold, split, samples
+        start=start,
+        near=near,
+        branch=branch,
+        task=task,
+        tolerance=tolerance,
+        corners=corners,
+        blend=blend,
+        speed=speed,
+        accel=accel,
+        tool_speed=tool_speed,
+        jerk=jerk,
+        hold=hold,
+        split=split,
+        samples=samples,
     )
     check_rates(arm)
     file = path_numbers.as_path_file(arm, moves, task)

@@ -29,7 +29,8 @@ def route_targets(arm: Arm, file: PathFile, step: float) -> tuple[Task, list[Arr
     """
     corner = default_corner_blend(file, None, None)
     pace = Pace(tolerance=file.tolerance or TOLERANCE)
-    outline = _Outline(arm, file, pace, arm.home, PathOptions(file.task, corner, None, None, False, None))
+    options = PathOptions(task=file.task, corner=corner, near=None, branch=None, split=False, samples=None)
+    outline = _Outline(arm, file, pace, arm.home, options)
     outline.step, outline.targets_per_route = step, []
     outline.plan_all(MOVES)
     if not outline.targets_per_route:

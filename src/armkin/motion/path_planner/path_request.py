@@ -64,7 +64,14 @@ def plan_path(arm: Arm, file: PathFile, request: PathRequest) -> PathPlan:
         start = legal_with_same_pulses(arm, start)
     near = None if request.near is None else np.asarray(request.near, dtype=float)
     corner_blend = default_corner_blend(file, request.corners, request.blend)
-    options = PathOptions(request.task, corner_blend, near, request.branch, request.split, request.samples)
+    options = PathOptions(
+        task=request.task,
+        corner=corner_blend,
+        near=near,
+        branch=request.branch,
+        split=request.split,
+        samples=request.samples,
+    )
     return prove_plan(Walk(arm, file, pace, start, options).plan_all(MOVES))
 
 
@@ -79,13 +86,13 @@ def _pace(arm: Arm, file: PathFile, request: PathRequest) -> Pace:
         if value is not None and not minimum <= value < np.inf:
             raise UsageError(f"{name} {value:g} is not possible; it is at least {minimum:g} {unit}")
     return Pace(
-        (file.speed or 100.0) / 100 * request.speed,
-        request.accel,
-        request.tool_speed if request.tool_speed is not None else file.tool_speed,
-        check_jerk(arm, request.jerk),
-        request.hold,
-        request.tolerance or file.tolerance or TOLERANCE,
-        np.deg2rad(file.turn_tolerance or 0.0),
+        speed=(file.speed or 100.0) / 100 * request.speed,
+        accel=request.accel,
+        tool_speed=request.tool_speed if request.tool_speed is not None else file.tool_speed,
+        jerk=check_jerk(arm, request.jerk),
+        hold=request.hold,
+        tolerance=request.tolerance or file.tolerance or TOLERANCE,
+        turn=np.deg2rad(file.turn_tolerance or 0.0),
     )
 
 

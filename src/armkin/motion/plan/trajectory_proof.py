@@ -249,7 +249,17 @@ def _proof_on_trajectory(
     body, keep_out = ("", "") if proof.pair is None else held.pair_names(proof.pair)
     joints = way.joints_at(np.array([proof.place]))[0]
     pairs = tuple(held.pair_names(k) for k in escaping)
-    return TrajectoryProof(proof.free, proof.mm, stretch, cell, joints, body, keep_out, pairs, postures)
+    return TrajectoryProof(
+        free=proof.free,
+        mm=proof.mm,
+        stretch=stretch,
+        cell=cell,
+        joints=joints,
+        body=body,
+        keep_out=keep_out,
+        escaping=pairs,
+        postures=postures,
+    )
 
 
 def _cell_count(stretch: Stretch) -> int:

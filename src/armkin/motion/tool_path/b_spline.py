@@ -48,7 +48,16 @@ class Layout:
         neighbours = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
         control = np.arange(len(inner)) + 3 * curves[inner]
         count = len(inner) + 3 * (int(curves[-1]) + 1)
-        return Layout(u, interval, places[inner], places[inner + 1], places[neighbours], control, curves[inner], count)
+        return Layout(
+            u=u,
+            interval=interval,
+            begin=places[inner],
+            end=places[inner + 1],
+            knots=places[neighbours],
+            control=control,
+            curve=curves[inner],
+            count=count,
+        )
 
     def values(self, control: Array) -> Array:
         """Points of the curves at the layout's parameters: control points (C, d) -> (N, d)."""

@@ -185,13 +185,13 @@ def _fit_block(
         low, high = passed[a], passed[b]
         (i, j), (k, m) = (np.searchsorted(x, [low - 1e-12, high + 1e-12]).tolist() for x in (bends, spans))
         dense = Dense(
-            passed[a : b + 1] - low,
-            spots.p[numbers[a : b + 1]],
-            bends[i:j] - low,
-            spans[k:m] - low,
-            passed[begins] - low,
-            speeds[begins, 0],
-            speeds[begins, 1],
+            given=passed[a : b + 1] - low,
+            points=spots.p[numbers[a : b + 1]],
+            bends=bends[i:j] - low,
+            spans=spans[k:m] - low,
+            begins=passed[begins] - low,
+            speed=speeds[begins, 0],
+            tool_speed=speeds[begins, 1],
         )
         first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
         pieces.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))

@@ -61,17 +61,19 @@ class Rows:
         _, curve = np.unique(chords.curve[numbers], return_inverse=True)
         starts = np.append(True, curve[1:] != curve[:-1])
         return Rows(
-            u,
-            np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),
-            curve,
-            _MISFIT_SHARE * np.where(is_point, tolerance, _CHORD_SHARE * tolerance + chords.sagitta[numbers]),
-            row_weight,
-            np.asfortranarray(np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])),
-            np.where(is_point, numbers + (share == 1), -1),
-            numbers,
-            share * chords.length[numbers],
-            (1 - share) * chords.length[numbers],
-            starts | np.append(starts[1:], True),
+            u=u,
+            y=np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),
+            curve=curve,
+            tolerance=_MISFIT_SHARE * np.where(is_point, tolerance, _CHORD_SHARE * tolerance + chords.sagitta[numbers]),
+            weight=row_weight,
+            chord_direction=np.asfortranarray(
+                np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])
+            ),
+            point=np.where(is_point, numbers + (share == 1), -1),
+            chord=numbers,
+            chord_done=share * chords.length[numbers],
+            chord_left=(1 - share) * chords.length[numbers],
+            ends=starts | np.append(starts[1:], True),
         )
 
     def part(self, curves: Int) -> Rows:

@@ -161,7 +161,16 @@ class Piece:
             return np.concatenate([y[:, :n], w], axis=1)
 
         dense = None if self.dense is None else self.dense.part(a, b)
-        return Piece(self.task, begin, curve, b - a, self.speed, self.tool_speed, self.rate, dense)
+        return Piece(
+            task=self.task,
+            first=begin,
+            curve=curve,
+            length=b - a,
+            speed=self.speed,
+            tool_speed=self.tool_speed,
+            rate=self.rate,
+            dense=dense,
+        )
 
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:

@@ -207,7 +207,15 @@ def _blend_radius(last_piece: Piece, piece: Piece, angle: float, wanted: float |
 def _dense_of_corner(piece: Piece, corner: Array) -> Dense:
     """The given point of a blend: its corner, passed in the middle."""
     none = np.zeros(0)
-    return Dense(np.array([piece.length / 2]), corner[None], none, none, none, none, none)
+    return Dense(
+        given=np.array([piece.length / 2]),
+        points=corner[None],
+        bends=none,
+        spans=none,
+        begins=none,
+        speed=none,
+        tool_speed=none,
+    )
 
 
 def both_move(a: Piece, b: Piece) -> bool:

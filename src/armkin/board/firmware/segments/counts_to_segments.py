@@ -174,7 +174,14 @@ class Cutter:
             spread = range(ticks - min(ticks // _CHOICE_TICKS, _MAX_CHOICES), ticks + 1)
             ticks = min(spread, key=lambda t: _fit_parabola(exact, t, change, quick)[3])
         interval, add, bend, _ = _fit_parabola(exact, ticks, change, quick)
-        segment = Segment(ticks, interval, add, _rounded_rates(remainders, ticks), bend, quick and bend != 0)
+        segment = Segment(
+            ticks=ticks,
+            interval=interval,
+            add=add,
+            rates=_rounded_rates(remainders, ticks),
+            bend=bend,
+            quick=quick and bend != 0,
+        )
         cycles_left = exact - cycles_of(segment)  # every interval is cut to whole cycles
         return replace(segment, interval=interval + round(cycles_left / ticks))
 

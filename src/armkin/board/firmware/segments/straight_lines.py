@@ -73,7 +73,7 @@ def line_segments(
     first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
     if not (last - first).any():
         return Move(first, last, (), 0)
-    line = LineSegments(first, last, law, clock, min_interval, pieces)
+    line = LineSegments(start=first, end=last, law=law, clock=clock, min_interval=min_interval, pieces=pieces)
     if len(line) > _EAGER_SEGMENTS:
         return Move(first, last, line, round(law.duration * clock))
     made = tuple(line)

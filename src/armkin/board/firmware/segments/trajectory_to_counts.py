@@ -90,7 +90,15 @@ class Cut(StartedTrajectory):
             a, b, least = start.tolist(), end.tolist(), self.min_interval
             return line_segments(a, b, stretch.law, clock=self.clock, min_interval=least, pieces=pieces)
         arm = self.trajectory.arm
-        parts = CurveSegments(arm, stretch, start, end, self.clock, self.min_interval, TOLERANCE)
+        parts = CurveSegments(
+            arm=arm,
+            stretch=stretch,
+            start=start,
+            end=end,
+            clock=self.clock,
+            min_interval=self.min_interval,
+            tolerance=TOLERANCE,
+        )
         cycles = round(stretch.duration * self.clock)
         return Move(start, end, parts if stretch.duration else (), cycles, curve=True, brake=brake_share(stretch))
 
