@@ -12,6 +12,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import as_joints, position
 from armkin.motion.branches.branch_path import coupled_motors
 from armkin.motion.joint_moves import check_rates
+from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
 from armkin.motion.timing.limit_jerk import Smoothed, smoothing_window
@@ -63,13 +64,27 @@ def time_law(
     check_rates(arm)
     values = as_joints(arm, q)
     parameter = np.arange(len(values), dtype=float) if s is None else np.asarray(s, dtype=float)
+    _check_samples(arm, values, parameter)
+    path = refine_knots(knots_of_samples(parameter, values))
+    limits: Array = arm.max_accel * accel
+    bounds = Bounds(arm.max_speed * speed, limits, _speed_cap(arm, path, tool_speed, hold))
+    curve = Curve(path, optimal_law(path, bounds, coupled_motors(arm, accel)))
+    stretch = curve if jerk is None else Smoothed(curve, smoothing_window(limits, jerk))
+    return Trajectory(arm, values[0], (stretch,))
+
+
+def _check_samples(arm: Arm, values: Array, parameter: Array) -> None:
+    """Raise UsageError unless there are five samples at least, all finite, with an increasing parameter."""
     if values.ndim != 2 or len(values) < 5 or parameter.shape != values.shape[:1]:
         raise UsageError(
             f"a way has samples (N, {arm.n}), N at least 5, and s (N,); got {values.shape}, {parameter.shape}"
         )
     if not (np.isfinite(values).all() and np.isfinite(parameter).all() and (np.diff(parameter) > 0).all()):
         raise UsageError("samples must be finite, and s must increase from each to the next")
-    path = refine_knots(knots_of_samples(parameter, values))
+
+
+def _speed_cap(arm: Arm, path: Knots, tool_speed: float | None, hold: float | None) -> Array:
+    """The square of the greatest speed along the path (N,), by the tool's speed [mm/s] and by a hold on the way."""
     cap = np.full(len(path.s), np.inf)
     if tool_speed is not None:
         tip = np.linalg.norm(np.diff(position(arm, path.q), axis=0), axis=1) / path.h
@@ -77,9 +92,4 @@ def time_law(
         cap = (tool_speed / np.maximum(tip, 1e-150)) ** 2
     if hold is not None:
         cap = np.minimum(cap, hold_cap(arm, path, hold))
-    limits: Array = arm.max_accel * accel
-    curve = Curve(path, optimal_law(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel)))
-    stretch: Curve | Smoothed = curve
-    if jerk is not None:
-        stretch = Smoothed(curve, smoothing_window(limits, jerk))
-    return Trajectory(arm, values[0], (stretch,))
+    return cap

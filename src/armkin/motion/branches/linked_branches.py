@@ -62,13 +62,9 @@ class _Linking:
         self.scale, self.top = largest_form(arm, self.lever)
         self.added = 0
         self.fresh = np.zeros(0, bool)  # whether a sample was added by a division
-        self.wide = [  # joints with a range over a whole turn: two copies may be legal at once
-            j
-            for j in range(arm.n)
-            if not arm.prismatic[j]
-            and arm.upper[j] - arm.lower[j] > self.turn[j] - 1e-6
-            and np.isfinite(arm.upper[j] - arm.lower[j])
-        ]
+        span = arm.upper - arm.lower
+        wide = ~arm.prismatic & (span > self.turn - 1e-6) & np.isfinite(span)
+        self.wide: list[int] = np.flatnonzero(wide).tolist()  # a range over a whole turn: two copies may be legal
 
     def start(self, s: Array) -> None:
         """Solve the first samples and link them."""

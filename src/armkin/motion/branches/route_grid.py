@@ -97,31 +97,45 @@ def _nearest_indices(ordered: Array, values: Array) -> Int:
 
 def _initial_grid(arm: Arm, way: Way, number: int, min_points: int) -> tuple[Array, Int]:
     """Grid points spaced by length and joint motion, and the indices of the breaks among them."""
-    route, s, q, a, b, windows, stops = way
-    bends = np.sort(np.concatenate([route.breaks, *([window.begin, window.end] for window in windows)]))
-    first, last = np.searchsorted(bends, [a + 1e-9, b - 1e-9])
-    edges = np.concatenate([[a], np.unique(bends[first:last]), [b]])
-    motion = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
-    measure = np.concatenate([[0.0], np.cumsum(motion.max(axis=1))])
-    levels = np.interp(edges, s, measure)
-    total = max(float(levels[-1] - levels[0]), 1e-12)
-    least_count = int(np.clip(2 * number / (len(edges) - 1), min_points, _SECTION_POINTS[1]))
-    share = _MOTION_SHARE * np.diff(levels) / total + (1 - _MOTION_SHARE) * np.diff(edges) / (b - a)
-    min_count = np.full(len(share), least_count)
-    if len(stops):
-        section_of = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # which part between two stops
-        min_count = np.maximum(min_count, -(-_REST_INTERVALS // np.bincount(section_of)[section_of]))
-    count = np.maximum((number * share).astype(int), min_count)
+    s, a, b = way.s, way.begin, way.end
+    edges = _section_edges(way)
+    motion_by_s = _accumulate_motion(arm, way.q)
+    motion = np.interp(edges, s, motion_by_s)
+    total_motion = max(float(motion[-1] - motion[0]), 1e-12)
+    share = _MOTION_SHARE * np.diff(motion) / total_motion + (1 - _MOTION_SHARE) * np.diff(edges) / (b - a)
+    count = np.maximum((number * share).astype(int), _min_counts(edges, way.stops, number, min_points))
     # equal steps of a level that grows with joint motion and length, in every section between two edges
     grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
-    level = _MOTION_SHARE * np.interp(grid, s, measure) / total + (1 - _MOTION_SHARE) * grid / (b - a)
-    ends = np.interp(edges, grid, level)
+    level = _MOTION_SHARE * np.interp(grid, s, motion_by_s) / total_motion + (1 - _MOTION_SHARE) * grid / (b - a)
+    level_at_edges = np.interp(edges, grid, level)
     begin = np.cumsum(count) - count
-    points = np.append(np.interp(divide_spans(ends, count), level, grid), b)
+    points = np.append(np.interp(divide_spans(level_at_edges, count), level, grid), b)
     points[begin] = edges[:-1]
-    spans = route.spans
-    inside = np.diff(np.searchsorted(spans, points))
+    inside = np.diff(np.searchsorted(way.route.spans, points))
     return _divide_intervals(points, begin[1:], np.where(inside > 1, inside + 1, 1))
+
+
+def _section_edges(way: Way) -> Array:
+    """Both ends of the way, and between them the route's breaks and the windows' ends: ascending [mm]."""
+    bends = np.sort(np.concatenate([way.route.breaks, *([window.begin, window.end] for window in way.windows)]))
+    first, last = np.searchsorted(bends, [way.begin + 1e-9, way.end - 1e-9])
+    return np.concatenate([[way.begin], np.unique(bends[first:last]), [way.end]])
+
+
+def _accumulate_motion(arm: Arm, q: Array) -> Array:
+    """How far the fastest joint has moved up to each sample (N,) [rad | 100 mm]."""
+    motion = np.abs(np.diff(q, axis=0)) / np.where(arm.prismatic, 100.0, 1.0)
+    return np.concatenate([[0.0], np.cumsum(motion.max(axis=1))])
+
+
+def _min_counts(edges: Array, stops: Array, number: int, min_points: int) -> Int:
+    """The least number of intervals (M,) of each section, so that enough lie between two stops, too."""
+    sections = len(edges) - 1
+    min_count = np.full(sections, int(np.clip(2 * number / sections, min_points, _SECTION_POINTS[1])))
+    if not len(stops):
+        return min_count
+    part = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # between which stops
+    return np.asarray(np.maximum(min_count, -(-_REST_INTERVALS // np.bincount(part)[part])))
 
 
 def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:

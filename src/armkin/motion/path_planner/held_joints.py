@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
@@ -41,10 +42,7 @@ def path_held(
     start = request.start_joints(arm)
     held_start = unlock(arm, held, start[free_indices])
     check_limits(arm, held_start[None])
-    near, jerk = (
-        None if value is None else np.broadcast_to(np.asarray(value, dtype=float), arm.n)[free_indices]
-        for value in (request.near, request.jerk)
-    )
+    near, jerk = (_free_values(value, arm.n, free_indices) for value in (request.near, request.jerk))
     free_request = replace(request, start=start[free_indices], near=near, jerk=jerk)
     try:
         plan = plan_path(free_arm, path_numbers.as_path_file(free_arm, moves, request.task), free_request)
@@ -64,6 +62,11 @@ def path_held(
     full_plan.approach = approach_move(arm, start, first_posture, *pace)
     markers = [replace(item, before=item.before + shift) for item in plan.markers]
     return prove_plan(full_plan.set_motion(first_posture, stretches, markers))
+
+
+def _free_values(values: ArrayLike | None, n: int, free_indices: list[int]) -> Array | None:
+    """The values of the free joints from () or (n,) of all; None without any."""
+    return None if values is None else np.broadcast_to(np.asarray(values, dtype=float), n)[free_indices]
 
 
 def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:

@@ -58,9 +58,8 @@ def jog_line(arm: Arm, q: Array, axis: str, frame: Frame, share: float) -> tuple
     rotates = axis not in ("x", "y", "z")
     top_speed = MAX_TURN_SPEED if rotates else MAX_TOOL_SPEED
     step = np.sign(share) * (POSTURE_STEP / 100 if rotates else POSTURE_STEP)
-    max_steps = max(
-        int(min(MAX_SECONDS * abs(share) * top_speed, np.pi * 0.9 if rotates else 2 * arm.reach) / abs(step)), 1
-    )
+    max_distance = min(MAX_SECONDS * abs(share) * top_speed, np.pi * 0.9 if rotates else 2 * arm.reach)
+    max_steps = max(int(max_distance / abs(step)), 1)
     count, end_text = _steps_carried(arm, task, q, axis, frame, step, max_steps)
     while count:
         target = _shift_target(arm, task, q, axis, frame, step * count)

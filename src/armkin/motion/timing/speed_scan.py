@@ -159,22 +159,31 @@ def _follow_run(y: Array, least: Least, first: Int, k: int, caps: Array) -> int:
     current, size = float(y[k]), _MIN_INTERVALS
     while True:
         end = min(k + size, len(y) - 1)
-        tops, last, values = caps[k + 1 : end + 1].tolist(), y[end], []
-        rows = (column[k:end].tolist() for column in least[:4])
         functions = _functions_by_interval(least, slice(first[k], first[end]))
-        for i, top, a0, b0, a1, b1 in zip(range(k, end), tops, *rows, strict=True):
-            value, candidate = a0 * current + b0, a1 * current + b1
-            if candidate < value:
-                value = candidate
-            if i in functions:
-                for a, b in functions[i]:
-                    candidate = a * current + b
-                    if candidate < value:
-                        value = candidate
-            value = value if value > 0.0 else 0.0
-            current = top if top < value else value
-            values.append(current)
+        values = _scan_intervals(current, least, functions, range(k, end), caps)
+        current, before = values[-1], y[end]
         y[k + 1 : end + 1] = values
-        if current == last or end == len(y) - 1:
+        if current == before or end == len(y) - 1:
             return end
         k, size = end, min(2 * size, _MAX_INTERVALS)
+
+
+def _scan_intervals(
+    current: float, least: Least, functions: dict[int, list[tuple[float, float]]], intervals: range, caps: Array
+) -> list[float]:
+    """What the scan reaches behind each of the intervals from `current` before the first; functions: further ones."""
+    values: list[float] = []
+    tops = caps[intervals.start + 1 : intervals.stop + 1].tolist()
+    rows = (column[intervals.start : intervals.stop].tolist() for column in least[:4])
+    for i, top, a0, b0, a1, b1 in zip(intervals, tops, *rows, strict=True):
+        value, candidate = a0 * current + b0, a1 * current + b1
+        if candidate < value:
+            value = candidate
+        for a, b in functions.get(i, ()):
+            candidate = a * current + b
+            if candidate < value:
+                value = candidate
+        value = value if value > 0.0 else 0.0
+        current = top if top < value else value
+        values.append(current)
+    return values

@@ -6,11 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Int
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.model.target_numbers import targets_in
 from armkin.motion.tool_path import path_numbers
 from armkin.motion.tool_path.chords import distinct_points, turn_angles
@@ -82,9 +82,8 @@ class Polyline:
             values = spots.relative_values(first, int(numbers[-1])) if turns else y[first : numbers[-1] + 1]
             assert values is not None
             values = (values * weights(self.task) if turns else values)[numbers - first]
-            pieces += _fit_block(
-                self.task, spots, numbers, block - block[0], values, speeds[numbers[1:] - 1], tolerance
-            )
+            through = _Block(numbers, ends=block - block[0], y=values, speeds=speeds[numbers[1:] - 1])
+            pieces += _fit_block(self.task, spots, through, tolerance)
         return pieces
 
     def _lines(self, spots: _Spots, speeds: Array) -> list[Piece]:
@@ -153,13 +152,18 @@ def _point_blocks(ends: Int, points: int) -> list[Int]:
     return [ends[a : b + 1] for a, b in pairwise([*first.tolist(), len(ends) - 1])]
 
 
-def _fit_block(
-    task: Task, spots: _Spots, numbers: Int, ends: Int, y: Array, speeds: Array, tolerance: float
-) -> list[Piece]:
-    """Smooth curves through some of the spots, one from each of the ends to the next.
+class _Block(NamedTuple):
+    """Some of the spots, through which smooth curves lead from each end to the next."""
 
-    y: (N, d) values of the spots [mm]; speeds: (N - 1, 2) of the lines between them.
-    """
+    numbers: Int  # (N,) of the spots
+    ends: Int  # (k,) indices into these
+    y: Array  # (N, d) [mm] values of the spots
+    speeds: Array  # (N - 1, 2) [mm/s] on the lines between them, nan: none given
+
+
+def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> list[Piece]:
+    """Smooth curves through a block's spots within the tolerance [mm], one from each of the ends to the next."""
+    numbers, ends, y, speeds = block
     if len(numbers) == 2:
         return [_line_between(task, spots, numbers, speeds)]
     moving = (y != y[0]).any(axis=0)  # other components are constant
@@ -174,8 +178,7 @@ def _fit_block(
 
     piece, length = unit_speed_piece(task, spots.spot(numbers[0]), curve_at, curve.begin)
     passed, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
-    same_speed = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
-    changes = np.append(True, ~same_speed.all(axis=1))
+    changes = _speed_changes(speeds)
     pieces = []
     for a, b in pairwise(ends.tolist()):
         if b == a + 1:
@@ -196,6 +199,12 @@ def _fit_block(
         first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
         pieces.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
     return pieces
+
+
+def _speed_changes(speeds: Array) -> Bool:
+    """Whether the speeds of each line (N,) differ from those of the line before; speeds: (N, 2), nan: none given."""
+    same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
+    return np.append(True, ~same.all(axis=1))
 
 
 def _curve_from(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -65,17 +66,35 @@ def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
         following = np.searchsorted(ends, sharp, side="right")
         u_before = np.maximum(u[sharp] - np.maximum(distance * tolerance, length[sharp - 1]), u[ends[following - 1]])
         u_after = np.minimum(u[sharp] + np.maximum(distance * tolerance, length[sharp]), u[ends[following]])
-        sides = [
-            np.stack([np.interp(places, u, y[:, k]) for k in range(y.shape[1])], axis=1)
-            for places in (u_before, u_after)
-        ]
-        far_turns = turn_angles(np.stack([sides[0], y[sharp], sides[1]], axis=1).reshape(-1, y.shape[1]))[::3]
+        before, after = _points_along(y, u, u_before), _points_along(y, u, u_after)
+        far_turns = turn_angles(np.stack([before, y[sharp], after], axis=1).reshape(-1, y.shape[1]))[::3]
         same_turn = (same_turn & (np.abs(far_turns - turns[sharp - 1]) < _SAME_TURN))[far_turns > CORNER_ANGLE]
         sharp, has_long_chords = sharp[far_turns > CORNER_ANGLE], has_long_chords[far_turns > CORNER_ANGLE]
     # with short chords, a turn that differs between near and far is a tight bend or noise, which a curve can pass
     corner[sharp[has_long_chords | same_turn]] = True
     corner[ends[1:-1]] = True
     return corner
+
+
+def _points_along(y: Array, u: Array, places: Array) -> Array:
+    """Points (k, d) at some places (k,) of the polygon through points y (N, d) at u (N,)."""
+    return np.stack([np.interp(places, u, y[:, k]) for k in range(y.shape[1])], axis=1)
+
+
+class _Cubics(NamedTuple):
+    """Cubics over the parameter of the chords."""
+
+    begin: Array  # (M,)
+    end: Array  # (M,)
+    powers: Array  # (M, 4, d) coefficients over the fraction of each
+
+    def take(self, chosen: Bool | Int) -> _Cubics:
+        """Some of the cubics."""
+        return _Cubics(self.begin[chosen], self.end[chosen], self.powers[chosen])
+
+    def chord(self, chords: Chords) -> Int:
+        """The chord (M,) that the middle of each lies on."""
+        return np.asarray(np.searchsorted(chords.u, (self.begin + self.end) / 2) - 1)
 
 
 def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCurves:
@@ -88,20 +107,18 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     stop = np.zeros(len(y), bool) if stop is None else stop
     used, parts = np.ones(len(y) - 1, bool), []
     for attempt in range(_MAX_TRIES + 1):
-        begin, end, powers, missed = _fit_cubics(chords, used, tolerance)
+        cubics, missed = _fit_cubics(chords, used, tolerance)
         # rounded chords replace cubics that miss points; in the last round they replace the whole curve
         retried = _chords_of_curves(chords, missed)
-        final = ~retried[np.searchsorted(chords.u, (begin + end) / 2) - 1] | (attempt == _MAX_TRIES)
-        parts.append((begin[final], end[final], powers[final]))
+        final = ~retried[cubics.chord(chords)] | (attempt == _MAX_TRIES)
+        parts.append(cubics.take(final))
         if not retried.any() or attempt == _MAX_TRIES:
             break
         inner = np.concatenate([[False], retried[1:] & retried[:-1] & ~chords.corner[1:-1], [False]])
         used, chords = retried, Chords(y, chords.corner | (missed if attempt + 1 < _MAX_TRIES else inner))
-    begin, end, powers = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-    order = np.argsort(begin, kind="stable")
-    begin, end, powers = begin[order], end[order], powers[order]
-    curve = chords.curve[np.searchsorted(chords.u, (begin + end) / 2) - 1]
-    return _round_corners(chords, stop, begin, end, powers, curve, tolerance)
+    every_cubic = _Cubics(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
+    in_order = every_cubic.take(np.argsort(every_cubic.begin, kind="stable"))
+    return _round_corners(chords, stop, in_order, tolerance)
 
 
 def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
@@ -111,7 +128,7 @@ def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
     return np.asarray(chosen_curves[chords.curve])
 
 
-def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Array, Array, Bool]:
+def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[_Cubics, Bool]:
     """Fit the curves with used chords: begin, end (M,), powers (M, 4, d) of cubics; which points they miss (N,)."""
     curve, u, y = chords.curve, chords.u, chords.y
     missed = np.zeros(len(y), bool)
@@ -136,7 +153,7 @@ def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[Array, Ar
         powers = np.concatenate([powers, cubics])
     missed[[0, -1]] = False
     missed &= ~chords.corner
-    return begin, end, powers, missed
+    return _Cubics(begin, end, powers), missed
 
 
 def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
@@ -174,42 +191,63 @@ def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     return np.unique(k[distances > tolerance + chords.sagitta[k]])
 
 
-def _round_corners(
-    chords: Chords, stop: Bool, begin: Array, end: Array, powers: Array, curve: Int, tolerance: float
-) -> FittedCurves:
+def _round_corners(chords: Chords, stop: Bool, cubics: _Cubics, tolerance: float) -> FittedCurves:
     """Round all corners except stops by cubics, within the tolerance and half of the adjacent sides."""
-    corner = np.flatnonzero(chords.corner)
-    passed, u = chords.u.copy(), chords.u
+    corner, u = np.flatnonzero(chords.corner), chords.u
+    curves = FittedCurves(
+        begin=np.append(cubics.begin, cubics.end[-1]),
+        powers=cubics.powers,
+        parameters=u.copy(),
+        bends=np.zeros(0),
+    )
     if not len(corner):
-        return FittedCurves(np.append(begin, end[-1]), powers, passed, np.zeros(0))
-    curves = FittedCurves(np.append(begin, end[-1]), powers, passed, np.zeros(0))
-    max_radius = np.where(stop[corner], 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
+        return curves
+    r, blends = _blend_corners(curves, chords, corner, stop[corner], tolerance)
+    # curve i lies between corners i - 1 and i and is trimmed to low .. high
+    low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
+    curve = chords.curve[cubics.chord(chords)]
+    parts = _trim_cubics(cubics, low[curve], high[curve])
+    rounded = ~stop[corner]
+    blend_begin, blend_end = (u[corner] - r)[rounded], (u[corner] + r)[rounded]
+    starts = np.append(parts.begin, blend_begin)
+    order = np.argsort(starts, kind="stable")
+    return FittedCurves(
+        begin=np.append(starts[order], u[-1]),
+        powers=np.concatenate([parts.powers, blends[rounded]])[order],
+        parameters=curves.parameters,
+        bends=np.sort(np.concatenate([blend_begin, blend_end])),
+    )
+
+
+def _blend_corners(
+    curves: FittedCurves, chords: Chords, corner: Int, stop: Bool, tolerance: float
+) -> tuple[Array, Array]:
+    """Half the length (k,) of the cubic that rounds each corner, 0 at stops, and the cubic's coefficients (k, 4, d)."""
+    u = chords.u[corner]
+    max_radius = np.where(stop, 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
     offset = 1e-9 * max_radius
-    slope_before, slope_after = (curves.values(u[corner] + way)[1] for way in (-offset, offset))
+    slope_before, slope_after = (curves.values(u + way)[1] for way in (-offset, offset))
     bend = np.linalg.norm(slope_before - slope_after, axis=1)
     r = np.minimum(max_radius, 4 * tolerance / np.maximum(bend, 1e-12))
     for _ in range(20):
-        (a, da), (b, db) = curves.values(u[corner] - r), curves.values(u[corner] + r)
+        (a, da), (b, db) = curves.values(u - r), curves.values(u + r)
         size = 2 * r[:, None]
         middle = (a + b) / 2 + size * (da - db) / 8
         distances = np.linalg.norm(middle - chords.y[corner], axis=1)
         if (distances <= tolerance).all():
             break
         r = np.where(distances > tolerance, 0.9 * r * tolerance / np.maximum(distances, 1e-12), r)
-    # curve i lies between corners i - 1 and i and is trimmed to low .. high
-    low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
-    x, y = np.maximum(begin, low[curve]), np.minimum(end, high[curve])
-    keep = y - x > 1e-12
-    x, y = x[keep], y[keep]
-    begin, end, powers = begin[keep], end[keep], powers[keep]
-    parts = _cubic_parts(powers, (x - begin) / (end - begin), (y - begin) / (end - begin))
-    blends = np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
-    rounded = ~stop[corner]
-    corner, r = corner[rounded], r[rounded]
-    starts = np.append(x, u[corner] - r)
-    order = np.argsort(starts, kind="stable")
-    bends = np.sort(np.concatenate([u[corner] - r, u[corner] + r]))
-    return FittedCurves(np.append(starts[order], u[-1]), np.concatenate([parts, blends[rounded]])[order], passed, bends)
+    return r, np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
+
+
+def _trim_cubics(cubics: _Cubics, low: Array, high: Array) -> _Cubics:
+    """The part of each cubic between low and high (M,); those of which nothing is left are dropped."""
+    begin, end = np.maximum(cubics.begin, low), np.minimum(cubics.end, high)
+    keep = end - begin > 1e-12
+    whole, begin, end = cubics.take(keep), begin[keep], end[keep]
+    length = whole.end - whole.begin
+    powers = _cubic_parts(whole.powers, (begin - whole.begin) / length, (end - whole.begin) / length)
+    return _Cubics(begin, end, powers)
 
 
 def _cubic_parts(c: Array, a: Array, b: Array) -> Array:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -161,16 +162,7 @@ class Piece:
             return np.concatenate([y[:, :n], w], axis=1)
 
         dense = None if self.dense is None else self.dense.part(a, b)
-        return Piece(
-            task=self.task,
-            first=begin,
-            curve=curve,
-            length=b - a,
-            speed=self.speed,
-            tool_speed=self.tool_speed,
-            rate=self.rate,
-            dense=dense,
-        )
+        return replace(self, first=begin, curve=curve, length=b - a, dense=dense)
 
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
@@ -242,8 +234,17 @@ def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:
     return unit_speed_piece(task, a, curve, u)[0]
 
 
-def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[Piece, Piece, Piece, float]:
-    """Round the corner of two pieces within a sphere around it: first piece, blend, second piece, and the radius.
+class Blend(NamedTuple):
+    """A rounded corner: what is left of the first piece, the curve, what is left of the second one."""
+
+    first: Piece
+    middle: Piece
+    second: Piece
+    radius: float  # [mm]
+
+
+def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> Blend:
+    """Round the corner of two pieces within a sphere around it.
 
     side: the first piece's length before the blend at its other end. The radius is `radius`, or less to leave half of
     each side.
@@ -267,11 +268,14 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> tuple[P
         c0, c1, c2, c3 = cubic
         return c0 + w * (c1 + w * (c2 + w * c3)), c1 + w * (2 * c2 + 3 * w * c3)
 
-    speeds = [x.speed for x in (a, b) if x.speed is not None]
-    tools = [x.tool_speed for x in (a, b) if x.tool_speed is not None]
-    made, _ = unit_speed_piece(task, start, curve, np.array([0.0, 1.0]))
-    middle = replace(made, speed=min(speeds, default=None), tool_speed=min(tools, default=None))
-    return first, middle, second, radius
+    middle, _ = unit_speed_piece(task, start, curve, np.array([0.0, 1.0]))
+    speed, tool_speed = _lower_speed(a.speed, b.speed), _lower_speed(a.tool_speed, b.tool_speed)
+    return Blend(first, replace(middle, speed=speed, tool_speed=tool_speed), second, radius)
+
+
+def _lower_speed(a: float | None, b: float | None) -> float | None:
+    """The lower of two speeds, None: not limited."""
+    return min((speed for speed in (a, b) if speed is not None), default=None)
 
 
 def _distance_from(piece: Piece, corner: Array, s: float) -> float:

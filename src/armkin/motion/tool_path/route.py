@@ -179,12 +179,14 @@ def join_pieces(
             stops.add(len(joined))
             joined.append(piece)
         else:
-            first, middle, last, radius_kept = blend(task, previous, piece, radius, side)
+            rounded = blend(task, previous, piece, radius, side)
+            middle = rounded.middle
             if wanted is None:
                 middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
             else:
-                reduced.note(wanted, radius_kept)
-            joined[-1:] = [p for p in (first, middle, last) if p is last or p.length > MIN_LENGTH]
+                reduced.note(wanted, rounded.radius)
+            before = [part for part in (rounded.first, middle) if part.length > MIN_LENGTH]
+            joined[-1:] = [*before, rounded.second]
         side = piece.length
     stops.add(len(joined))
     return Route(task, tuple(joined), frozenset(stops)), order
