@@ -1,7 +1,7 @@
-"""The first hour of an arm on its board: directions, zeros, limits, and a first move that comes back home.
+"""Commissioning of an arm on its board: directions, zeros, limits, and a first move out of home and back.
 
-Every motion before the last one is a jog that lasts as long as a key is held, at a tenth of the joint's speed. What is
-found is not applied here: it is `Findings`, for the robot file.
+Every motion before that move is a jog at a tenth of the joint's speed that lasts as long as a key is held. The results
+are not applied here: `Findings` collects them for the robot file.
 """
 
 from __future__ import annotations
@@ -22,64 +22,64 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-SPEED_SHARE = 0.1  # share of a joint's max_speed for all that moves here
-DIRECTION_STEP = 2.0  # way [deg | mm] that a joint may leave its place while its direction is looked at
-_FIRST_DISTANCE = 5.0  # way [deg | mm] that each joint leaves home in the first move
-_MAX_JOG = 60.0  # length [s], at most, of one jog
-_VISIBLE_DISTANCE = 1.0  # way [mm] that the tool must move to tell a direction by it
+SPEED_SHARE = 0.1  # share of a joint's max_speed of all motions here
+DIRECTION_STEP = 2.0  # largest joint travel [deg | mm] in the test of a direction
+_FIRST_DISTANCE = 5.0  # joint travel [deg | mm] of the first move
+_MAX_JOG = 60.0  # longest jog [s]
+_VISIBLE_DISTANCE = 1.0  # smallest tool travel [mm] that shows a direction
 
 
 class Operator(Protocol):
-    """Who stands beside the arm."""
+    """The person beside the arm, who reads messages and presses keys."""
 
     def say(self, text: str) -> None:
-        """Something to read."""
+        """Show a message."""
 
     def ask(self, question: str, answers: str) -> str:
-        """A question that one of some keys answers."""
+        """Ask a question, and return the key among `answers` that answers it."""
 
     def key(self) -> str:
-        """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
+        """The next key: a character, ``+`` and ``-`` also for arrow keys, a line feed for Enter."""
 
     def held(self, key: str) -> Callable[[], bool] | None:
-        """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
+        """A function that tells whether the key is still held; None if it was released at once."""
 
 
 @dataclass
 class Findings:
-    """What the robot file does not say, or says otherwise."""
+    """Corrections and additions to the robot file."""
 
-    inverted: set[int] = field(default_factory=set)  # motors whose direction is the other one
-    zeros: dict[int, int] = field(default_factory=dict)  # motor -> count where its joint is 0
-    limits: dict[int, tuple[float, float]] = field(default_factory=dict)  # joint -> [deg | mm]
-    at_home: bool | None = None  # whether the arm came back
+    inverted: set[int] = field(default_factory=set)  # motors with the opposite direction
+    zeros: dict[int, int] = field(default_factory=dict)  # motor: count where its joint is 0
+    limits: dict[int, tuple[float, float]] = field(default_factory=dict)  # joint: lower and upper limit [deg | mm]
+    at_home: bool | None = None  # whether the first move came back to the home pose
 
 
 def directions(board: Board, person: Operator) -> set[int]:
-    """The motors that turn the other way than the robot file says: each joint moves by 2 degrees or mm at most."""
-    arm, wrong = board.arm, set()
+    """The motors whose direction differs from the robot file, found by moving each joint by up to 2 degrees or mm."""
+    arm, inverted = board.arm, set()
     _able_to_jog(board, person)
     person.say("Directions: hold + to move a joint by up to 2 degrees (mm), - to take it back; Enter when you saw it.")
-    for j, name in enumerate(arm.joint_names):
+    for joint, name in enumerate(arm.joint_names):
         person.say(
-            f"{name}, +: {_expected_motion(arm, board.machine.joints() if _position_known(board) else arm.home, j)}"
+            f"{name}, +: {_expected_motion(arm, board.machine.joints() if _position_known(board) else arm.home, joint)}"
         )
         board.machine.refresh()
-        place = float(board.machine.joints()[j])
+        start = float(board.machine.joints()[joint])
         while True:
-            _nudge_joint(board, person, j, place)
+            _nudge_joint(board, person, joint, start)
             answer = person.ask(f"{name}: did + move it so? y yes, n the other way, a again, s skip", "ynas")
             if answer != "a":
                 break
         if answer == "n":
-            wrong |= _motors_of(arm, j, person)
-    return wrong
+            inverted |= _motors_of(arm, joint, person)
+    return inverted
 
 
 def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, int]:
-    """Have the arm stand in its home pose and its board know it; bus servos: the counts where joints are 0.
+    """Bring the arm to its home pose and set the board's position; for bus servos the counts where joints are 0.
 
-    forget: what the board believed was counted in wrong directions.
+    forget: drop the board's position, which was counted in wrong directions.
     """
     arm, machine = board.arm, board.machine
     if forget:
@@ -110,50 +110,50 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
 
 
 def limits(board: Board, person: Operator) -> dict[int, tuple[float, float]]:
-    """Narrower limits for joints that cannot go as far as the robot file says."""
+    """Narrower limits for joints that cannot use the whole range in the robot file."""
     person.say("Limits: go where a joint may not go farther, then [ makes that its lower limit, ] its upper one.")
     person.say("The file's limits stop it, too. Enter when there is nothing more to correct.")
     return jog_by_keys(board, person, narrower=True)
 
 
 def first_move(board: Board, person: Operator) -> bool:
-    """Leave home by a few degrees and come back, planned, at a tenth of the speed; whether the arm stands at home."""
+    """Move out of home by a few degrees and back at a tenth of the speed; whether the arm is at home afterwards."""
     arm, machine = board.arm, board.machine
     machine.prepare()
-    up, down = arm.upper - arm.home, arm.home - arm.lower
-    excursion = np.minimum(units.joints_in(arm, [_FIRST_DISTANCE] * arm.n), 0.5 * np.maximum(up, down))
-    goals = np.array([arm.home + np.where(up >= down, excursion, -excursion), arm.home])
+    range_above, range_below = arm.upper - arm.home, arm.home - arm.lower
+    excursion = np.minimum(units.joints_in(arm, [_FIRST_DISTANCE] * arm.n), 0.5 * np.maximum(range_above, range_below))
+    goals = np.array([arm.home + np.where(range_above >= range_below, excursion, -excursion), arm.home])
     try:
-        made = board.plan(machine.counts(), goals, SPEED_SHARE)
+        plan = board.plan(machine.counts(), goals, SPEED_SHARE)
     except NoSolutionError as error:
         person.say(f"The way out of home is not free ({error.message.splitlines()[0]}): the arm moves home only.")
-        made = board.plan(machine.counts(), arm.home[None], SPEED_SHARE)
-    question = f"First move: {made.duration:.1f} s out and back home by itself, Ctrl-C stops it. y: go; s: skip"
+        plan = board.plan(machine.counts(), arm.home[None], SPEED_SHARE)
+    question = f"First move: {plan.duration:.1f} s out and back home by itself, Ctrl-C stops it. y: go; s: skip"
     if person.ask(question, "ys") == "s":
         return False
-    machine.run([made])
+    machine.run([plan])
     return person.ask("Check: does it stand in its home pose again, to the mark? y yes, n no", "yn") == "y"
 
 
 def jog_by_keys(board: Board, person: Operator, *, narrower: bool = False) -> dict[int, tuple[float, float]]:
-    """Joints by keys: a number chooses one, + and - move it while they are held, Enter ends.
+    """Jog joints by keys: a number chooses a joint, + and - move it while they are held, Enter ends.
 
-    narrower: [ and ] make where a joint stands its lower or upper limit; these are returned.
+    narrower: [ and ] set the lower or upper limit to the joint's present value. Returns these limits.
     """
-    arm, chosen = board.arm, 0
+    arm, joint = board.arm, 0
     limits_set: dict[int, tuple[float, float]] = {}
-    names = ", ".join(f"{_KEYS[j]} {name}" for j, name in enumerate(arm.joint_names))
+    names = ", ".join(f"{_KEYS[number]} {name}" for number, name in enumerate(arm.joint_names))
     person.say(f"Joints: {names}; hold + or - to move the chosen one.")
-    person.say(f"{arm.joint_names[chosen]} is chosen.")
+    person.say(f"{arm.joint_names[joint]} is chosen.")
     while (key := person.key()) != "\n":
         if key in _KEYS[: arm.n]:
-            chosen = _KEYS.index(key)
-            person.say(f"{arm.joint_names[chosen]} is chosen.")
-        elif key in "+-" and (more := person.held(key)) is not None:
-            _jog_joint(board, person, chosen, 1 if key == "+" else -1, _MAX_JOG, more)
+            joint = _KEYS.index(key)
+            person.say(f"{arm.joint_names[joint]} is chosen.")
+        elif key in "+-" and (is_held := person.held(key)) is not None:
+            _jog_joint(board, person, joint, 1 if key == "+" else -1, _MAX_JOG, is_held)
             person.say(_position_in_words(board))
         elif narrower and key in "[]":
-            _narrow_limit(board, person, limits_set, chosen, upper=key == "]")
+            _narrow_limit(board, person, limits_set, joint, upper=key == "]")
     return limits_set
 
 
@@ -161,26 +161,26 @@ _KEYS = "123456789abc"  # keys of up to twelve joints
 
 
 def _narrow_limit(
-    board: Board, person: Operator, limits: dict[int, tuple[float, float]], j: int, *, upper: bool
+    board: Board, person: Operator, limits: dict[int, tuple[float, float]], joint: int, *, upper: bool
 ) -> None:
-    """Make where joint j stands its limit, rounded inwards to a tenth."""
-    arm, name = board.arm, board.arm.joint_names[j]
+    """Set a limit of a joint to its present value, rounded inwards to a tenth."""
+    arm, name = board.arm, board.arm.joint_names[joint]
     rows = np.stack([arm.lower, arm.upper, arm.home, board.machine.joints()])
-    low, high, home, standing = (round(value, 9) for value in units.joints_out(arm, rows)[:, j].tolist())
-    low, high = limits.get(j, (low, high))
-    value = round(float(np.floor(standing * 10 + 1e-6) if upper else np.ceil(standing * 10 - 1e-6)) / 10, 1) + 0.0
+    low, high, home, present = (round(value, 9) for value in units.joints_out(arm, rows)[:, joint].tolist())
+    low, high = limits.get(joint, (low, high))
+    value = round(float(np.floor(present * 10 + 1e-6) if upper else np.ceil(present * 10 - 1e-6)) / 10, 1) + 0.0
     pair = (low, value) if upper else (value, high)
     if not np.isfinite(pair).all():
         person.say(f"{name} has no limits in the file: write both there, limits: [LOWER, UPPER], then begin again.")
     elif not pair[0] <= home <= pair[1] or pair[0] >= pair[1]:
         person.say(f"{name}: {pair[0]:g} to {pair[1]:g} would leave its home ({home:g}) out: not taken.")
     else:
-        limits[j] = pair
+        limits[joint] = pair
         person.say(f"{name}: limits {pair[0]:g} to {pair[1]:g}.")
 
 
 def _able_to_jog(board: Board, person: Operator) -> None:
-    """Have a board whose kind moves nothing while the position is lost take the arm to stand at home."""
+    """Get ready to jog; if the board needs a position for that, ask for the arm in its home pose."""
     try:
         board.ready_to_jog(0, float(SPEED_SHARE * board.arm.max_speed[0]))
     except PositionLostError:
@@ -191,7 +191,7 @@ def _able_to_jog(board: Board, person: Operator) -> None:
         )
         board.machine.prepare(assume=board.arm.home)
     except NoSolutionError:
-        return  # the joint stands at its limit: the other way is open
+        return  # the joint is at its limit and can move the other way
 
 
 def _until_enter(person: Operator, text: str) -> None:
@@ -200,28 +200,32 @@ def _until_enter(person: Operator, text: str) -> None:
         pass
 
 
-def _nudge_joint(board: Board, person: Operator, j: int, place: float) -> None:
-    """Move joint j by keys within DIRECTION_STEP of its place [rad | mm]; each way back stops there; Enter ends."""
+def _nudge_joint(board: Board, person: Operator, joint: int, start: float) -> None:
+    """Move a joint by keys within DIRECTION_STEP of its start [rad | mm], stopping there on the return; Enter ends."""
     arm, machine = board.arm, board.machine
-    step = float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[j])
+    step = float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[joint])
     while (key := person.key()) != "\n":
-        if key not in "+-" or (more := person.held(key)) is None:
+        if key not in "+-" or (is_held := person.held(key)) is None:
             continue
         sign = 1 if key == "+" else -1
-        away = sign * (float(machine.joints()[j]) - place)
-        seconds = (step - away if away > -0.1 * step else -away) / (SPEED_SHARE * float(arm.max_speed[j]))
+        travel = sign * (float(machine.joints()[joint]) - start)
+        seconds = (step - travel if travel > -0.1 * step else -travel) / (SPEED_SHARE * float(arm.max_speed[joint]))
         if seconds > 0.01:
-            _jog_joint(board, person, j, sign, seconds, more)
+            _jog_joint(board, person, joint, sign, seconds, is_held)
         else:
-            back = "-+"[sign < 0]
-            person.say(f"{arm.joint_names[j]} has moved by {DIRECTION_STEP:g}: {back} takes it back, Enter goes on.")
+            other = "-+"[sign < 0]
+            person.say(
+                f"{arm.joint_names[joint]} has moved by {DIRECTION_STEP:g}: {other} takes it back, Enter goes on."
+            )
 
 
-def _jog_joint(board: Board, person: Operator, j: int, sign: int, seconds: float, goes_on: Callable[[], bool]) -> None:
-    """Jog a joint at a tenth of its speed; what stops it is told."""
-    rate = sign * SPEED_SHARE * float(board.arm.max_speed[j])
+def _jog_joint(
+    board: Board, person: Operator, joint: int, sign: int, seconds: float, goes_on: Callable[[], bool]
+) -> None:
+    """Jog a joint at a tenth of its speed, and show the message of an error that stops it."""
+    rate = sign * SPEED_SHARE * float(board.arm.max_speed[joint])
     try:
-        board.jog(j, board.ready_to_jog(j, rate), seconds, goes_on)
+        board.jog(joint, board.ready_to_jog(joint, rate), seconds, goes_on)
     except NoSolutionError as error:
         person.say(error.message.splitlines()[0])
     board.machine.refresh()
@@ -232,39 +236,39 @@ def _position_known(board: Board) -> bool:
 
 
 def _position_in_words(board: Board) -> str:
-    """Where the arm stands, in words."""
+    """The arm's position in words."""
     q = where_arm_stands(board.machine)["joints"]
     if q is None:
         return "moved; its position is not known yet"
     return ", ".join(f"{name} = {value:.2f}" for name, value in zip(board.arm.joint_names, q, strict=True))
 
 
-def _expected_motion(arm: Arm, q: Array, j: int) -> str:
-    """What 2 degrees (mm) of a joint do, in the base's frame: ``the tool goes 6.9 mm towards +y``."""
-    J = jacobian(arm, q)[:, j] * float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[j])
+def _expected_motion(arm: Arm, q: Array, joint: int) -> str:
+    """The tool's motion for 2 degrees (mm) of a joint, in the base: ``the tool goes 6.9 mm towards +y``."""
+    J = jacobian(arm, q)[:, joint] * float(units.joints_in(arm, [DIRECTION_STEP] * arm.n)[joint])
     shift = J[:3]
     if float(np.linalg.norm(shift)) >= _VISIBLE_DISTANCE:
         return f"the tool goes {float(np.linalg.norm(shift)):.1f} mm, mostly towards {_main_direction(shift)}"
     axis = fk(arm, q)[:3, :3].T @ J[3:]
-    about = _main_direction(J[3:])
+    axis_name = _main_direction(J[3:])
     remark = " (the tool's own z)" if abs(axis[2]) > 0.99 * float(np.linalg.norm(axis)) else ""
-    turn = "counter-clockwise" if about[0] == "+" else "clockwise"
-    return f"the tool turns {turn} about {about[1]}{remark}, seen with {about[1]} pointing at you"
+    turn = "counter-clockwise" if axis_name[0] == "+" else "clockwise"
+    return f"the tool turns {turn} about {axis_name[1]}{remark}, seen with {axis_name[1]} pointing at you"
 
 
 def _main_direction(vector: Array) -> str:
-    k = int(np.argmax(np.abs(vector)))
-    return f"{'+' if vector[k] > 0 else '-'}{'xyz'[k]}"
+    axis = int(np.argmax(np.abs(vector)))
+    return f"{'+' if vector[axis] > 0 else '-'}{'xyz'[axis]}"
 
 
-def _motors_of(arm: Arm, j: int, person: Operator) -> set[int]:
-    """The motors that turn joint j alone; of motors that several joints share nothing is concluded."""
-    mine = {k for k in range(len(arm.motors)) if arm.motor_gain[k, j]}
-    shared = [arm.motors[k].name for k in mine if np.count_nonzero(arm.motor_gain[k]) > 1]
+def _motors_of(arm: Arm, joint: int, person: Operator) -> set[int]:
+    """The motors that drive a joint alone; none, with a message, if the joint shares its motors."""
+    motors = {motor for motor in range(len(arm.motors)) if arm.motor_gain[motor, joint]}
+    shared = [arm.motors[motor].name for motor in motors if np.count_nonzero(arm.motor_gain[motor]) > 1]
     if shared:
         person.say(
-            f"{arm.joint_names[j]} shares its motors ({', '.join(sorted(shared))}): which is wrong follows from all "
-            "its joints together; correct invert: or joints: of these motors in the file by hand."
+            f"{arm.joint_names[joint]} shares its motors ({', '.join(sorted(shared))}): which is wrong "
+            "follows from all its joints together; correct invert: or joints: of these motors in the file by hand."
         )
         return set()
-    return mine
+    return motors

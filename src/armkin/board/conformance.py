@@ -1,11 +1,11 @@
-"""What every kind of board must hold, as a suite that is given a way to start a kind's emulator.
+"""Conformance tests for every kind of board, run on an emulator of that kind.
 
     @pytest.mark.parametrize("case", conformance.CASES, ids=lambda case: case.__name__)
     def test_my_kind(case): case(start)
 
-`start` gives an `Emulated`: a board on which the arm stands at home, and what its motors really do. Never a false
-position, never success for what was not done, never a hang: a case that finds one raises AssertionError.
-`times` of a case: how often it does what it does; with less than all, a sample for a slow emulator.
+`start` gives an `Emulated`: a board with an arm at home, and the true positions of its motors. A case raises
+AssertionError if the board reports a false position, reports success for an incomplete motion, or hangs. The argument
+`times` of a case is its number of repetitions, which a slow emulator may reduce.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from armkin.errors import ArmkinError, LinkError
 from armkin.formula.arrays import Array
 from armkin.motors import joints
 
-PATIENCE = 120.0  # time [s] that a motion may take longer than planned, whatever happens
+PATIENCE = 120.0  # longest delay [s] of a motion beyond its plan
 _numbers = itertools.count()
 
 
@@ -37,11 +37,11 @@ class Emulated:
 
     board: Board
     port: Port
-    pins: Callable[[], Sequence[float]]  # counts where the motors really stand
-    reset: Callable[[], None] | None = None  # the board starts anew
-    foreign: Sequence[Callable[[], None]] = ()  # what another program does to it on its port
-    stall: Callable[[], None] | None = None  # an axis sticks, of a kind that sees it
-    tolerance: int = 0  # [counts] of a position at rest
+    pins: Callable[[], Sequence[float]]  # true counts of the motors
+    reset: Callable[[], None] | None = None  # resets the board
+    foreign: Sequence[Callable[[], None]] = ()  # actions of another program on its port
+    stall: Callable[[], None] | None = None  # blocks an axis, on kinds that detect it
+    tolerance: int = 0  # [counts] between true and reported position at rest
     line: Line = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,9 +49,9 @@ class Emulated:
 
 
 class Line:
-    """The way to an emulator: what goes over it may be lost, doubled or damaged, and it may be cut."""
+    """The line to an emulator, which a test can cut, or on which it can lose, double or damage bytes."""
 
-    simulated = False  # nobody vouches for a position by itself
+    simulated = False  # a real port: a lost position is not assumed
 
     def __init__(self, port: Port) -> None:
         self._port, self.baud = port, port.baud
@@ -65,7 +65,7 @@ class Line:
         self._port.write(data)
 
     def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds."""
+        """The bytes that have arrived, or arrive within `timeout` seconds."""
         self._check_cable()
         return self.spoil(self._port.read(timeout))
 
@@ -74,7 +74,7 @@ class Line:
         return self._port.now()
 
     def close(self) -> None:
-        """The emulator stays."""
+        """Do nothing, as the emulator is used again."""
 
     def _check_cable(self) -> None:
         if self.cut:
@@ -100,7 +100,7 @@ def _pin_counts(emulated: Emulated) -> list[int]:
 
 
 def _connect_and_settle(emulated: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
-    """The arm, whose place is known: from the board, or on the word of somebody who looks."""
+    """Connect the arm, and set the true position if the board has lost it."""
     machine = emulated.board.connect(emulated.line, stop)
     lost = machine.position() == "lost"
     machine.prepare(assume=joints(machine.arm, _pin_counts(emulated)) if lost else None)
@@ -112,7 +112,7 @@ def _is_near(emulated: Emulated, counts: Sequence[int]) -> bool:
 
 
 def _check_truth(emulated: Emulated) -> str:
-    """What the board says of its position, which must be true: known, lost, or an error in words."""
+    """The board's position state after a check that it is true: known, lost, or an error in words."""
     emulated.line.spoil, emulated.line.cut = bytes, False
     _wait_for_rest(emulated)
     try:
@@ -127,18 +127,18 @@ def _check_truth(emulated: Emulated) -> str:
 
 
 def _wait_for_rest(emulated: Emulated) -> None:
-    """Wait until nothing moves any more."""
-    end, before = emulated.line.now() + PATIENCE, list[int]()
-    while before != (counts := _pin_counts(emulated)) and emulated.line.now() < end:
-        before = counts
-        until = emulated.line.now() + 1.0
-        while emulated.line.now() < until:
+    """Wait until no motor moves."""
+    end, last_counts = emulated.line.now() + PATIENCE, list[int]()
+    while last_counts != (counts := _pin_counts(emulated)) and emulated.line.now() < end:
+        last_counts = counts
+        wait_end = emulated.line.now() + 1.0
+        while emulated.line.now() < wait_end:
             emulated.port.read(0.05)
 
 
 def _carry_out_motion(emulated: Emulated, machine: Backend, goal: Array, speed: float = 1.0) -> bool:
-    """Run a motion; False if it was refused or broke off in words. What is said to be done must be done."""
-    began = emulated.line.now()
+    """Run a motion and check its end; False if it was refused or ended with an error."""
+    start_time = emulated.line.now()
     plan = machine.plan(machine.counts(), goal, speed=speed)
     try:
         machine.run([plan])
@@ -149,7 +149,7 @@ def _carry_out_motion(emulated: Emulated, machine: Backend, goal: Array, speed: 
         assert _is_near(emulated, plan.end.tolist()), (
             f"said to be done: {plan.end.tolist()}, pins at {_pin_counts(emulated)}"
         )
-    assert emulated.line.now() - began < plan.duration + PATIENCE, "a hang"
+    assert emulated.line.now() - start_time < plan.duration + PATIENCE, "a hang"
     return succeeded
 
 
@@ -161,7 +161,7 @@ def _random_goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator
 
 
 def moves_are_read_back_exactly(start: Start, times: int = 200) -> None:
-    """Where the board says that it stands is where its motors stand, after each of many moves."""
+    """The board reports the true position of its motors after each of many moves."""
     with _start_emulator(start) as emulated:
         machine = _connect_and_settle(emulated)
         for goal in itertools.islice(_random_goals(emulated, 3), times):
@@ -170,21 +170,21 @@ def moves_are_read_back_exactly(start: Start, times: int = 200) -> None:
 
 
 def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, times: int = 36) -> None:
-    """One answer in some is lost, said twice, or has a bit flipped."""
-    ways = list(itertools.product((0.1, 0.01), ("damaged", "lost", "doubled")))
-    for number, (share, kind) in enumerate(ways[:times]):
+    """No position is false while a share of the answers is lost, doubled or damaged in one bit."""
+    variants = list(itertools.product((0.1, 0.01), ("damaged", "lost", "doubled")))
+    for number, (share, kind) in enumerate(variants[:times]):
         rng = random.Random(f"{kind} {share}")
 
         def spoil(data: bytes, kind: str = kind, share: float = share, rng: random.Random = rng) -> bytes:
             if not data or rng.random() > share:
                 return data
-            k = rng.randrange(len(data))
-            changed = data[:k] + bytes([data[k] ^ 1 << rng.randrange(8)]) + data[k + 1 :]
+            position = rng.randrange(len(data))
+            changed = data[:position] + bytes([data[position] ^ 1 << rng.randrange(8)]) + data[position + 1 :]
             return {"lost": b"", "doubled": data + data, "damaged": changed}[kind]
 
         with _start_emulator(start) as emulated:
             _connect_and_settle(emulated)
-            for goal in itertools.islice(_random_goals(emulated, 5), len(range(number, times, len(ways)))):
+            for goal in itertools.islice(_random_goals(emulated, 5), len(range(number, times, len(variants)))):
                 with suppress(ArmkinError):
                     emulated.line.spoil = spoil
                     machine = emulated.board.connect(emulated.line)
@@ -197,15 +197,15 @@ def answers_that_are_lost_doubled_or_damaged_make_nothing_false(start: Start, ti
 
 
 def _while_moving(emulated: Emulated, asks: int, act: Callable[[], object] | None) -> bool:
-    """A motion in which something happens, or that is held (None), when a stop has been asked for so many times."""
+    """Run a motion, and call `act`, or hold it (None), at the poll number `asks` of the stop function."""
     count, moving = itertools.count(), list[bool]()
 
     def stop() -> bool:
-        reached = bool(moving) and next(count) >= asks
-        if reached and act is not None:
+        is_due = bool(moving) and next(count) >= asks
+        if is_due and act is not None:
             moving.clear()
             act()
-        return reached and act is None
+        return is_due and act is None
 
     machine = _connect_and_settle(emulated, stop)
     moving.append(True)
@@ -213,24 +213,24 @@ def _while_moving(emulated: Emulated, asks: int, act: Callable[[], object] | Non
 
 
 def _distant_goal(emulated: Emulated) -> Array:
-    """A goal some way from where the arm stands."""
-    standing = joints(emulated.board.arm, _pin_counts(emulated))
-    return max(itertools.islice(_random_goals(emulated, 7, 0.4), 20), key=lambda q: float(np.abs(q - standing).max()))
+    """A goal far from the arm's present position."""
+    present = joints(emulated.board.arm, _pin_counts(emulated))
+    return max(itertools.islice(_random_goals(emulated, 7, 0.4), 20), key=lambda q: float(np.abs(q - present).max()))
 
 
 def a_reset_in_a_motion_is_told(start: Start, times: int = 5) -> None:
-    """The motion is not said to be done, and what is said of the position is true."""
-    for k in range(times):
+    """After a reset during a motion the board reports no success and no false position."""
+    for trial in range(times):
         with _start_emulator(start) as emulated:
             if emulated.reset is not None:
-                _while_moving(emulated, 1 + 6 * k, emulated.reset)
+                _while_moving(emulated, 1 + 6 * trial, emulated.reset)
                 _check_truth(emulated)
 
 
 def another_program_makes_nothing_false(start: Start, times: int | None = None) -> None:
-    """Another program on the line speaks before, between and in motions: no position is false."""
-    ways = itertools.product((8, None, 1, 25), range(len(start().foreign)))
-    for asks, number in itertools.islice(ways, times):
+    """No position is false after another program has used the line before, between and during motions."""
+    variants = itertools.product((8, None, 1, 25), range(len(start().foreign)))
+    for asks, number in itertools.islice(variants, times):
         with _start_emulator(start) as emulated:
             act = emulated.foreign[number]
             if asks is None:
@@ -246,42 +246,42 @@ def another_program_makes_nothing_false(start: Start, times: int | None = None) 
 
 
 def a_cable_that_is_pulled_makes_nothing_false(start: Start, times: int = 20) -> None:
-    """A cable is pulled at many moments of a motion; the next program says where the arm stands, or that none knows."""
+    """After a cable was pulled at any moment of a motion the next program reports a true position or a lost one."""
 
     with _start_emulator(start) as emulated:
 
         def pull() -> None:
             emulated.line.cut = True
 
-        for k in range(times):
+        for trial in range(times):
             with suppress(ArmkinError):
-                assert not _while_moving(emulated, 2 * k, pull) or not emulated.line.cut
+                assert not _while_moving(emulated, 2 * trial, pull) or not emulated.line.cut
             _check_truth(emulated)
 
 
 def a_stalled_axis_is_told(start: Start, times: int = 3) -> None:
-    """A motion in which an axis stalls is not said to be done, by kinds that can see a stall."""
-    for k in range(times):
+    """Kinds that detect a stall report no success for a motion in which an axis stalls."""
+    for trial in range(times):
         with _start_emulator(start) as emulated:
             if emulated.stall is not None:
-                assert not _while_moving(emulated, 1 + 6 * k, emulated.stall)
+                assert not _while_moving(emulated, 1 + 6 * trial, emulated.stall)
                 _check_truth(emulated)
 
 
 def a_hold_keeps_the_position_and_the_next_motion_goes_on(start: Start, times: int = 20) -> None:
-    """A hold at many places of a motion keeps the position, and the next motion goes on from there."""
+    """The position is kept after a hold at any place of a motion, and the next motion starts from there."""
     with _start_emulator(start) as emulated:
-        for k in range(times):
-            _while_moving(emulated, 1 + 3 * k, None)
+        for trial in range(times):
+            _while_moving(emulated, 1 + 3 * trial, None)
             assert _check_truth(emulated) == "known", "a hold has lost the position"
             assert _carry_out_motion(emulated, _connect_and_settle(emulated), _distant_goal(emulated))
 
 
 def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> None:
-    """A plan that begins at other counts raises StartError and moves nothing: it is a bug of who made it."""
+    """A plan that begins at other counts raises StartError and moves nothing."""
     with _start_emulator(start) as emulated:
         machine = _connect_and_settle(emulated)
-        before, first_plan = _pin_counts(emulated), machine.plan(machine.counts(), _distant_goal(emulated))
+        start_counts, first_plan = _pin_counts(emulated), machine.plan(machine.counts(), _distant_goal(emulated))
         plan = machine.plan(first_plan.end.tolist(), machine.arm.home)
         try:
             machine.run([plan])
@@ -290,7 +290,7 @@ def a_plan_that_begins_elsewhere_moves_nothing(start: Start, times: int = 1) -> 
         else:
             raise AssertionError("a plan that begins elsewhere was carried out")
         _wait_for_rest(emulated)
-        assert np.abs(np.array(before) - emulated.pins()).max() <= emulated.tolerance
+        assert np.abs(np.array(start_counts) - emulated.pins()).max() <= emulated.tolerance
 
 
 CASES: tuple[Callable[..., None], ...] = (

@@ -1,4 +1,4 @@
-"""What is told of an arm on its board, as JSON: where it stands, what a plan comes to."""
+"""The JSON types of an arm's position and of the summary of a plan."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from armkin.model.units import JointUnits
 
 
 class Where(TypedDict):
-    """Where the arm stands."""
+    """The position of an arm."""
 
     position: Annotated[
         str,
@@ -21,7 +21,7 @@ class Where(TypedDict):
 
 
 class Summary(TypedDict):
-    """What a plan comes to."""
+    """The summary of a plan."""
 
     waypoints: Annotated[int, "how many waypoints it goes through"]
     start_joints: Annotated[list[float], "joint values where it begins [deg or mm]"]

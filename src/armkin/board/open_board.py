@@ -1,4 +1,4 @@
-"""The arm on a board of any kind, by the port's name."""
+"""Opens the board of an arm, of any kind, by the name of its port."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def open_board(
     stop: Callable[[], bool] = lambda: False,
     reset: bool = True,
 ) -> Iterator[Backend]:
-    """The arm on the board behind a port, given back at the end; baud: by default the kind's own.
+    """The arm on the board behind a port, which is closed at the end; baud: by default that of the kind.
 
-    stop: asked all the time; when it says yes, the arm is held and StoppedError raised.
+    stop: called again and again; when it returns True, the arm is held and StoppedError is raised.
     """
     link = with_log(board.open(port, baud, reset=reset))
     try:

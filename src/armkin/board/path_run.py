@@ -1,4 +1,4 @@
-"""A planned path on a board: laid out before anything moves, carried out part by part, the gripper between."""
+"""Runs a planned path on a board: checks all parts first, then carries them out with the gripper moves between."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
     from armkin.motion.plan.path_plan import Marker, PathPlan
 
-Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a trajectory from counts, on some board
+Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # makes a board's plan of a trajectory from counts
 
 
 def lay_parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
-    """A plan's approach, if it has one, and its motion between the gripper's, from counts.
+    """The approach of a plan, if it has one, and the parts of its motion between gripper moves, as plans for a board.
 
     Raises UsageError if the board is too slow for it.
     """
     motion = plan.motion
     edges = [0, *(marker.before for marker in plan.markers), len(motion.stretches)]
-    laid, begin, q = [], np.asarray(start, dtype=np.int64), motion.start
+    parts, begin, q = [], np.asarray(start, dtype=np.int64), motion.start
     if plan.approach is not None:
-        laid.append(lay(plan.approach, begin))
-        begin = laid[0].end
+        parts.append(lay(plan.approach, begin))
+        begin = parts[0].end
     for a, b in pairwise(edges):
         trajectory = Trajectory(plan.arm, q, motion.stretches[a:b])
         part = lay(trajectory, begin)
-        laid.append(part)
+        parts.append(part)
         begin, q = part.end, trajectory.end
-    return laid
+    return parts
 
 
 def check_gripper(plan: PathPlan, board: Board) -> None:
@@ -48,7 +48,7 @@ def check_gripper(plan: PathPlan, board: Board) -> None:
 
 
 def check_pauses(plan: PathPlan, answers: bool) -> None:
-    """Raise UsageError if the plan rests until Enter, and nobody answers."""
+    """Raise UsageError if the plan has a pause until Enter and there is no terminal."""
     if not answers and any(marker.kind == "pause" for marker in plan.markers):
         raise UsageError("the path rests until Enter (M0, wait: enter), and there is no terminal to press it")
 
@@ -61,20 +61,20 @@ def follow_plan(
     first: int = 0,
     ask: Callable[[], object] = lambda: None,
 ) -> None:
-    """Carry out a plan's parts from the `first` on, which are `laid`, and what the gripper does between them.
+    """Carry out the parts of a plan, numbered from `first` on, and the gripper moves between them.
 
-    ask: what ends a rest until Enter.
+    laid: the parts as plans for the board; ask: waits for the user to end a pause.
     """
     elapsed, total = 0.0, sum(part.duration for part in laid)
     markers: list[Marker | None] = list(plan.markers)
-    if plan.approach is not None:  # no marker stands behind it
+    if plan.approach is not None:  # no marker follows the approach
         markers.insert(0, None)
-    for k, part in enumerate(laid, first):
+    for number, part in enumerate(laid, first):
         if part.trajectory.stretches:
-            begun = elapsed
-            board.machine.run([part], lambda seconds, _, begun=begun: progress(begun + seconds, total))  # type: ignore[misc]
+            offset = elapsed
+            board.machine.run([part], lambda seconds, _, offset=offset: progress(offset + seconds, total))  # type: ignore[misc]
             elapsed += part.duration
-        marker = markers[k] if k < len(markers) else None
+        marker = markers[number] if number < len(markers) else None
         if marker is not None and marker.kind == "pause":
             ask()
         elif marker is not None:

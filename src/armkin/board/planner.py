@@ -1,4 +1,4 @@
-"""An arm that is told where to go: plans for its board one after another, rows as they come, where it stands."""
+"""Plans for an arm that is sent goals: consecutive plans for its board, from rows as they arrive, and summaries."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
 
-_ROWS_AHEAD = 1000  # rows that are read before they are planned
+_ROWS_AHEAD = 1000  # most rows that are read ahead of planning
 
 
 class Planner:
-    """Plans for one arm at one speed, and what they come to."""
+    """Makes plans for one arm at one speed, and sums them up."""
 
     def __init__(self, board: Board, speed: float, blend: float = 0.0) -> None:
         """blend: how far from a waypoint its rounding begins [deg | mm]; 0: stop in each."""
         self.arm, self.board = board.arm, board
         self.speed, self.blend = speed, blend
-        self.total_sent = Total(board.arm)  # what has been sent
+        self.total_sent = Total(board.arm)  # the sum of all plans that were sent
 
     def counts(self, q: Array) -> list[int]:
         """Counts at joint values."""
@@ -45,42 +45,42 @@ class Planner:
         """A plan through joint values (w, n) [rad | mm]."""
         if not self.blend:
             return self.board.plan(start, q, self.speed)
-        counts = np.asarray(start, dtype=np.int64)
-        way = round_waypoints(self.arm, joints(self.arm, counts), q, self.blend, speed=self.speed, hold=HOLD_FACTOR)
-        return self.board.lay(way, counts)
+        begin = np.asarray(start, dtype=np.int64)
+        motion = round_waypoints(self.arm, joints(self.arm, begin), q, self.blend, speed=self.speed, hold=HOLD_FACTOR)
+        return self.board.lay(motion, begin)
 
     def sum_up(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
-        """Pass plans on and sum them up in `total_sent`; none is kept, as rows may come for hours."""
-        for made in plans:
-            if made is not None:
-                self.total_sent.add(made)
-            yield made
+        """Pass plans on and add them to `total_sent`, without keeping them, since rows may arrive for hours."""
+        for plan in plans:
+            if plan is not None:
+                self.total_sent.add(plan)
+            yield plan
 
 
 class Total:
-    """What plans, one after another, come to."""
+    """The sum of consecutive plans: counts, segments, seconds and greatest speeds."""
 
     def __init__(self, arm: Arm, plans: Iterable[Planned] = ()) -> None:
         self.arm = arm
         self.waypoints, self.segments, self.duration = 0, 0, 0.0
-        self.first: list[int] = []  # counts; none before the first plan
+        self.first: list[int] = []  # counts; empty before the first plan
         self.last: list[int] = []
-        self.speed: Array = np.zeros(arm.n)  # greatest of each joint
-        self.rate: Array = np.zeros(len(motor_names(arm)))  # greatest of each motor
-        for made in plans:
-            self.add(made)
+        self.speed: Array = np.zeros(arm.n)  # greatest speed of each joint
+        self.rate: Array = np.zeros(len(motor_names(arm)))  # greatest rate of each motor
+        for plan in plans:
+            self.add(plan)
 
-    def add(self, made: Planned) -> None:
-        """One more plan."""
-        self.first = self.first or made.start.tolist()
-        self.last = made.end.tolist()
+    def add(self, plan: Planned) -> None:
+        """Add a plan."""
+        self.first = self.first or plan.start.tolist()
+        self.last = plan.end.tolist()
         self.waypoints += sum(
-            stretch.waypoints if isinstance(stretch, Curve) else 1 for stretch in made.trajectory.stretches
+            stretch.waypoints if isinstance(stretch, Curve) else 1 for stretch in plan.trajectory.stretches
         )
-        self.segments += made.segments
-        self.duration += made.duration
-        self.speed = np.maximum(self.speed, made.trajectory.top_speed)
-        self.rate = np.maximum(self.rate, made.top_rate)
+        self.segments += plan.segments
+        self.duration += plan.duration
+        self.speed = np.maximum(self.speed, plan.trajectory.top_speed)
+        self.rate = np.maximum(self.rate, plan.top_rate)
 
     def summary(self, start: Sequence[int] | None = None) -> Summary:
         """JSON; start: counts where the arm stood, by default the first plan's."""
@@ -107,13 +107,13 @@ class Total:
 
 
 class Stream:
-    """Rows of joint values that come while the arm moves, each planned as soon as it is there.
+    """Rows of joint values that arrive while the arm moves, each planned on arrival.
 
-    A thread reads them, at most a thousand ahead: who writes faster than the arm moves has to wait.
+    A thread reads at most a thousand rows ahead, so a writer that is faster than the arm has to wait.
     """
 
     def __init__(self, arm: Arm, rows: Iterable[tuple[int, Sequence[float]]]) -> None:
-        """rows: number and joint values [deg | mm]; what is wrong with one is an ArmkinError."""
+        """rows: number and joint values [deg | mm]; the iterable raises ArmkinError for a wrong row."""
         self.problem: ArmkinError | None = None
         self._rows: queue.Queue[tuple[int, Sequence[float]] | Exception | None] = queue.Queue(_ROWS_AHEAD)
         self._arm = arm
@@ -123,13 +123,13 @@ class Stream:
         try:
             for row in rows:
                 self._rows.put(row)
-        except Exception as error:  # told, or raised if it is a bug, in `plans`: this thread has nobody to tell
+        except Exception as error:  # `plans` reports or raises it in the caller's thread
             self._rows.put(error)
         self._rows.put(None)
 
     def plans(self, planner: Planner, start: Sequence[int]) -> Iterator[Planned | None]:
-        """Plans as rows come; None while there is none. What is wrong with a row ends it: `problem`."""
-        counts, empty = list(start), True
+        """Plans as rows arrive, None while there is no row. A wrong row ends them and sets `problem`."""
+        counts, no_rows = list(start), True
         while True:
             try:
                 item = self._rows.get_nowait()
@@ -143,33 +143,33 @@ class Stream:
                 return
             if isinstance(item, Exception):
                 raise item
-            empty = False
+            no_rows = False
             try:
-                made = planner.plan(counts, units.joints_in(self._arm, [item[1]]))
+                plan = planner.plan(counts, units.joints_in(self._arm, [item[1]]))
             except (NoSolutionError, UsageError) as error:
-                words = f"row {item[0]}: {error.message}; the rows before it were carried out"
-                self.problem = type(error)(words, advice=error.advice, **{**error.fields, "row": item[0]})
+                text = f"row {item[0]}: {error.message}; the rows before it were carried out"
+                self.problem = type(error)(text, advice=error.advice, **{**error.fields, "row": item[0]})
                 return
-            counts = made.end.tolist()
-            yield made
-        if empty:
+            counts = plan.end.tolist()
+            yield plan
+        if no_rows:
             self.problem = UsageError("there are no rows: nothing was moved")
 
     def all_plans(self, planner: Planner, start: Sequence[int]) -> list[Planned]:
-        """All plans, once the last row has come. Raises what is wrong with one."""
+        """All plans, once the last row has arrived. Raises the error of a wrong row."""
         plans = []
-        for made in self.plans(planner, start):
-            if made is None:
+        for plan in self.plans(planner, start):
+            if plan is None:
                 time.sleep(0.01)
             else:
-                plans.append(made)
+                plans.append(plan)
         if self.problem is not None:
             raise self.problem
         return plans
 
 
 def where_arm_stands(machine: Backend) -> Where:
-    """Where the arm stands, as JSON [deg | mm]."""
+    """The arm's position, as JSON [deg | mm]."""
     arm = machine.arm
     is_known = machine.position() != "lost"
     q = machine.joints() if is_known else None

@@ -1,4 +1,4 @@
-"""Signals while an arm moves: a request to stop it first."""
+"""Turns signals into a request to stop the arm before the program ends."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from armkin.signals import put_off
 
 
 class Stop:
-    """Whether somebody asked to stop: Ctrl-C, SIGTERM, a closed terminal."""
+    """Whether a signal has asked to stop: Ctrl-C, SIGTERM, a closed terminal."""
 
     def __init__(self) -> None:
         self.signal = 0
-        self.at_once = False  # nothing moves: there is nothing to wait for
+        self.at_once = False  # whether the arm is at rest, so that a signal ends the program at once
 
     def __call__(self) -> bool:
         return self.signal != 0
@@ -32,12 +32,12 @@ class Stop:
             raise StoppedError
 
 
-_active: list[Stop] = []  # signal handlers belong to the process, and so does who listens to them
+_active: list[Stop] = []  # one list for the process, as signal handlers are
 
 
 @contextmanager
 def planning() -> Iterator[None]:
-    """Work before anything moves: a signal ends it at once, within whatever `stoppable` it is done."""
+    """Work before the arm moves, which a signal ends at once within an outer `stoppable`."""
     if not _active:
         yield
         return
@@ -56,7 +56,7 @@ def stoppable() -> Iterator[Stop]:
     """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
     stop = Stop()
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    before = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
+    old_handlers = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
     _active.append(stop)
     try:
         yield stop
@@ -64,5 +64,5 @@ def stoppable() -> Iterator[Stop]:
         raise SystemExit(128 + stop.signal) from None
     finally:
         _active.remove(stop)
-        for number, handler in before.items():
+        for number, handler in old_handlers.items():
             signal.signal(number, handler)

@@ -1,16 +1,16 @@
-"""What every kind of board can do for an arm. Our own firmware is one of several.
+"""The interface of every kind of board, of which our own firmware is one.
 
-board.py            what a kind is: one class, with capabilities
-motion_start.py     where a motion begins: what every trajectory that becomes counts is held to
-sent_positions.py   a trajectory for a board that is sent positions, not segments
+board.py            a kind of board: one class, with capabilities
+motion_start.py     checks on the start of every trajectory that becomes counts
+sent_positions.py   trajectories for boards that take positions instead of segments
 servo_arm.py        an arm of bus servos of any make
 stepper_arm.py      an arm of steppers on a board that obeys every program
-position_record.py  what armkin last left on a board that other programs write to
-assumptions.py      motors and rates made up for a simulation, where the file has none
-missing_keys.py     what a robot file lacks for its board
+position_record.py  the position that armkin last left on a board that other programs use, too
+assumptions.py      assumed motors and rates for a simulation
+missing_keys.py     keys that a robot file lacks for its board
 
-A backend is made for an arm and an open port. It speaks joints and counts of the arm's motors; how a trajectory
-becomes bytes is its own business.
+A backend belongs to an arm and an open port. Its interface has joint values and counts of the arm's motors, and hides
+how a trajectory becomes bytes.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ Progress = Callable[[float, float], None]  # seconds done, seconds in all
 
 
 class StoppedError(Exception):
-    """The operator asked to stop: the arm stands, `status` says where (None: it was not asked yet)."""
+    """Raised with the arm at rest when the operator asks to stop; `status` has its position, or None if not read."""
 
     def __init__(self, status: Any = None) -> None:
         super().__init__("stopped")
@@ -44,19 +44,19 @@ class StoppedError(Exception):
 
 
 class Planned(Protocol):
-    """A trajectory as one kind of board carries it out."""
+    """A trajectory in the form that one kind of board carries out."""
 
     @property
     def trajectory(self) -> Trajectory:
-        """Joints and seconds."""
+        """The trajectory, in joint values and seconds."""
 
     @property
     def start(self) -> NDArray[np.int64]:
-        """Counts where it begins: (motors,)."""
+        """Counts at the beginning: (motors,)."""
 
     @property
     def end(self) -> NDArray[np.int64]:
-        """Counts where it ends: (motors,)."""
+        """Counts at the end: (motors,)."""
 
     @property
     def duration(self) -> float:
@@ -64,7 +64,7 @@ class Planned(Protocol):
 
     @property
     def segments(self) -> int:
-        """Pieces that are sent to the board."""
+        """The number of pieces that are sent to the board."""
 
     @property
     def top_rate(self) -> Array:
@@ -74,13 +74,13 @@ class Planned(Protocol):
 class Backend(ABC):
     """An arm on its board."""
 
-    differences: tuple[str, ...] = ()  # what this kind of board cannot promise, for people
+    differences: tuple[str, ...] = ()  # sentences on what this kind of board cannot guarantee
     arm: Arm
     port: Port
 
     @abstractmethod
     def position(self) -> Position:
-        """Whether the board knows where the arm stands."""
+        """Whether the board knows the arm's position."""
 
     @property
     @abstractmethod
@@ -92,22 +92,22 @@ class Backend(ABC):
         """Counts of the arm's motors, as last read."""
 
     def joints(self) -> Array:
-        """Joint values where it stands, as last read: (n,) [rad | mm]."""
+        """Joint values of the arm, as last read: (n,) [rad | mm]."""
         return joints(self.arm, self.counts())
 
     @abstractmethod
     def refresh(self) -> None:
-        """Read again where the arm stands."""
+        """Read the arm's position again."""
 
     @abstractmethod
     def hold(self) -> None:
-        """Stop along the path, and stay."""
+        """Stop along the path, and stay there."""
 
     @abstractmethod
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Get ready to move; True if the position was lost.
 
-        assume: (n,) [rad | mm] where an arm whose position is lost stands, on the operator's word.
+        assume: (n,) [rad | mm] joint values of an arm whose position is lost, as the operator states them.
         """
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
@@ -120,12 +120,12 @@ class Backend(ABC):
 
     @abstractmethod
     def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> object:
-        """Carry out plans, one after another; None in between: nothing to do yet."""
+        """Carry out plans in order; a None among them means that the next plan is not there yet."""
 
     @abstractmethod
     def standing_text(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
+        """A sentence on where the arm has come to rest, and what the next command needs."""
 
     @abstractmethod
     def report(self) -> dict[str, Any]:
-        """What `armkin status` tells besides the position."""
+        """The fields of `armkin status` besides the position."""

@@ -1,6 +1,7 @@
-"""What a robot file does not say of motors and rates, made up: for a board in this process alone.
+"""Assumes motors and rates where a robot file has none, for simulated boards only.
 
-A table from a paper or a URDF has no drives. A simulated arm moves all the same; a real one never does on such figures.
+A robot file made from a paper or a URDF has no drives. With assumed ones it can be simulated; a real arm never moves on
+assumed figures.
 """
 
 from __future__ import annotations
@@ -25,37 +26,37 @@ _RATES = {"max_speed": (30.0, 50.0), "max_accel": (60.0, 100.0)}  # rates of a t
 
 
 def arm_with_assumptions(arm: Arm) -> tuple[Arm, list[str]]:
-    """The arm with motors and rates where it has none, and in words what was made up; nothing: the same arm.
+    """The arm with assumed motors and rates where it lacks them, and the list of assumptions in words.
 
     >>> import armkin
     >>> arm_with_assumptions(armkin.load("puma560"))[1][1]
     'max_speed of q1, q2, q3, q4, q5, q6: 30 deg/s'
     """
     assumptions = []
-    if bare := undriven_joints(arm):
-        arm = _with_steppers(arm, bare)
-        assumptions.append(f"motors of {', '.join(bare)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
-        if any(arm.prismatic[arm.joint_names.index(name)] for name in bare):
+    if names := undriven_joints(arm):
+        arm = _with_steppers(arm, names)
+        assumptions.append(f"motors of {', '.join(names)}: steppers of 200 full steps, 16 microsteps, gear {_GEAR:g}")
+        if any(arm.prismatic[arm.joint_names.index(name)] for name in names):
             assumptions[-1] += f" (slides: {_LEAD:g} mm a turn)"
-    arm, rates_said = with_rates(arm)
-    return arm, assumptions + rates_said
+    arm, rate_assumptions = with_rates(arm)
+    return arm, assumptions + rate_assumptions
 
 
 def with_rates(arm: Arm) -> tuple[Arm, list[str]]:
-    """The arm with a max_speed and a max_accel where it has none, and in words which: for plans that move nothing."""
+    """The arm with assumed max_speed and max_accel where it lacks them, and these in words, for mere plans."""
     assumptions = []
     for key, names in missing_rates(arm).items():
         values = getattr(arm, key).copy()
         for name in names:
-            j = arm.joint_names.index(name)
-            values[j] = _RATES[key][1] if arm.prismatic[j] else _RATES[key][0] * DEGREE
-        turning, sliding = (
+            joint = arm.joint_names.index(name)
+            values[joint] = _RATES[key][1] if arm.prismatic[joint] else _RATES[key][0] * DEGREE
+        rotary, prismatic = (
             [n for n in names if arm.prismatic[arm.joint_names.index(n)] == slides] for slides in (False, True)
         )
-        per = "s" if key == "max_speed" else "s2"
-        for group, value, unit in ((turning, _RATES[key][0], "deg"), (sliding, _RATES[key][1], "mm")):
+        time = "s" if key == "max_speed" else "s2"
+        for group, value, unit in ((rotary, _RATES[key][0], "deg"), (prismatic, _RATES[key][1], "mm")):
             if group:
-                assumptions.append(f"{key} of {', '.join(group)}: {value:g} {unit}/{per}")
+                assumptions.append(f"{key} of {', '.join(group)}: {value:g} {unit}/{time}")
         arm = replace(arm, **{key: values})
     return arm, assumptions
 
@@ -64,12 +65,12 @@ def _with_steppers(arm: Arm, joints: list[str]) -> Arm:
     """The arm with a stepper for each of these joints."""
     motors, gain = list(arm.motors), [*arm.motor_gain]
     for name in joints:
-        j = arm.joint_names.index(name)
-        slides = bool(arm.prismatic[j])
+        joint = arm.joint_names.index(name)
+        slides = bool(arm.prismatic[joint])
         chain = {"lead": _LEAD} if slides else {"gear": _GEAR}
         motors.append(Motor.model_validate({"name": name, "joints": {name: 1.0}, **_STEPPER, **chain}))
         row = np.zeros(arm.n)
-        row[j] = motors[-1].pulses_per_unit() / (1.0 if slides else DEGREE)
+        row[joint] = motors[-1].pulses_per_unit() / (1.0 if slides else DEGREE)
         gain.append(row)
     bias = np.concatenate([arm.motor_bias, np.zeros(len(joints))])
     return replace(arm, motors=tuple(motors), motor_gain=np.array(gain), motor_bias=bias)

@@ -1,8 +1,8 @@
-"""An arm's board: what armkin asks of every kind, our own firmware's among them.
+"""The base class of all kinds of boards, our own firmware's among them.
 
-A kind is one class: what can be said without a port (does the arm fit, what does a trajectory become, where may
-such a board be), and, once `connect` has been called, what the board does. Some of that is a capability, which a kind
-has or lacks: it is asked for by its name (`can`, `require`), never by the kind.
+A kind is one class. Some methods need no port: they check whether the arm fits, convert a trajectory, or list ports
+that may have such a board. The others drive the board once `connect` has been called. A method that only some kinds
+have is a capability: callers ask for it by name (`can`, `require`) and never by the kind.
 
     board = board_of(arm)                    # UsageError if the arm cannot be driven
     machine = board.connect(board.open(name), stop)
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from armkin.robot_file.robot_keys import Gripper
 
 Never = Callable[[], bool]
-JOG_PIECE = 0.3  # length [s] of one piece of a jog on a board that cannot be told to go on
+JOG_PIECE = 0.3  # length [s] of one piece of a jog on a board that cannot extend a motion
 
 CAPABILITIES = {
     "home": "find the limit switches",
@@ -51,38 +51,38 @@ CAPABILITIES = {
 
 
 class LostSteps(NamedTuple):
-    """What a switch that was met again tells of the counts."""
+    """The error of the counts, as measured at a limit switch that was found again."""
 
     joint: str
-    steps: int | None  # steps of its motor that the counts were ahead of the arm; None: its position was not known
-    difference: float | None  # way [rad | mm]
+    steps: int | None  # motor steps by which the counts were ahead of the arm; None: its position was unknown
+    difference: float | None  # the same as joint travel [rad | mm]
 
 
 class Gripped(NamedTuple):
-    """Where a gripper was sent, and where it came to rest, both in its drive's units."""
+    """The target of a gripper and the position where it came to rest, both in its drive's units."""
 
     position: float
     target: float
     unit: str  # deg, mm, or S of a spindle's output
-    counts: int | None = None  # where the board counts them
+    counts: int | None = None  # counts, on boards that count
     count_unit: str = ""
-    measured: bool = False  # it may have closed on something before it was where it was sent
+    measured: bool = False  # whether the position was measured, and may differ from the target
 
 
 class Board(ABC):
     """An arm's board of some kind."""
 
     baud: ClassVar[int] = BAUD
-    gripper_drive: ClassVar[str] = "none"  # the kind of drive of a gripper that it moves
-    gripper_taken: ClassVar[str] = "it moves none"  # which gripper this kind moves, for an error
-    lacks: ClassVar[Mapping[str, str]] = {}  # capability -> why there is none, for people
-    hint: ClassVar[str] = "armkin ports lists them"  # where the names of its ports are found
-    home_speed: ClassVar[float] = 1.0  # fraction of the joints' speeds on the way to the home pose
-    machine: Backend  # once connected
+    gripper_drive: ClassVar[str] = "none"  # kind of gripper drive that it moves
+    gripper_taken: ClassVar[str] = "it moves none"  # the gripper that this kind moves, in an error text
+    lacks: ClassVar[Mapping[str, str]] = {}  # missing capability: reason, for an error text
+    hint: ClassVar[str] = "armkin ports lists them"  # how the user finds the names of its ports
+    home_speed: ClassVar[float] = 1.0  # fraction of the joints' speeds on a move to the home pose
+    machine: Backend  # set by connect
     stop: Never
 
     def __init__(self, arm: Arm, *, rehearsal: bool = False) -> None:
-        """Raises UsageError, naming what is missing, if such an arm cannot be planned or driven.
+        """Raises UsageError, with the missing keys, if the arm cannot be planned or driven.
 
         rehearsal: for a plan or a simulated board.
         """
@@ -92,7 +92,7 @@ class Board(ABC):
             raise UsageError(text, robot_file=arm.path, lines_to_add=lines)
         self.check()
 
-    # What each kind does in its own way
+    # Methods that each kind defines
 
     @abstractmethod
     def check(self) -> None:
@@ -114,7 +114,7 @@ class Board(ABC):
     def replies(self, link: Port, stop: Never) -> bool:
         """Whether such a board replies behind an open port. Raises LinkError, too, if none does."""
 
-    # The same for most
+    # Methods that most kinds share
 
     @property
     def kind(self) -> str:
@@ -128,7 +128,7 @@ class Board(ABC):
 
     @property
     def settings_file(self) -> str | None:
-        """What its owner writes into a file of the board's, where it has one."""
+        """The text for the board's own configuration file, if it has one."""
         return None
 
     def plan(self, start: Sequence[int], targets: Array, speed: float = 1.0) -> Planned:
@@ -149,47 +149,47 @@ class Board(ABC):
             return self.replies(link, stop)
         return False
 
-    # Connected
+    # Methods of a connected board
 
     def connect(self, port: Port, stop: Never = lambda: False) -> Backend:
-        """The arm on the board behind an open port, `machine` from now on. Raises as `attach` does.
+        """Connect the arm to the board behind an open port and set `machine`. Raises as `attach` does.
 
-        stop: asked all the time; when it says yes, the arm is held and StoppedError raised.
+        stop: called again and again; when it returns True, the arm is held and StoppedError is raised.
         """
         self.stop = stop
         self.machine = self.attach(port, stop)
         return self.machine
 
     def begin_job(self) -> None:
-        """Begin another job on the machine: what ended the one before is over."""
+        """Begin another job after one that ended or failed."""
         self.machine.refresh()
 
     def wait(self, until: float) -> bool:
-        """Wait for a moment of the port's clock; False if a stop was asked for before."""
+        """Wait until a time of the port's clock; False if a stop was asked for before."""
         while self.machine.port.now() < until and not self.stop():
             self.machine.port.read(0.01)
         return not self.stop()
 
     def heard(self) -> None:
-        """Take the newest word of where the arm is while it moves."""
+        """Process the newest position report while the arm moves."""
         return
 
     def stopped(self, error: StoppedError) -> None:
-        """Take the word of where the arm came to rest."""
+        """Process the report of where the arm came to rest."""
         return
 
     @contextmanager
     def under_way(
         self, parts: Sequence[Planned], note: Any
     ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
-        """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
+        """The parts to carry out, the number of the first of them, and a function that takes the seconds done.
 
-        note: of `recall`, the motion that is resumed; None: all of it.
+        note: the note from `recall` of a motion that is resumed; None: carry out all parts.
         """
         yield parts, 0, lambda seconds: None
 
     def forget(self) -> None:
-        """Let the board take the robot file as it is now: what it believed of another one is lost."""
+        """Make the board accept the present robot file; the position that it had is lost."""
         return
 
     def go_home(self) -> None:
@@ -198,7 +198,7 @@ class Board(ABC):
         self.machine.run([self.plan(self.machine.counts(), self.arm.home[None], self.home_speed)])
 
     def ready_to_jog(self, joint: int, rate: float) -> float:
-        """Get ready to move one joint; the rate [rad/s | mm/s] that it may be moved at.
+        """Get ready to move one joint, and give the rate [rad/s | mm/s] at which it may move.
 
         Raises NoSolutionError if it would go farther outside its limits.
         """
@@ -207,21 +207,21 @@ class Board(ABC):
         return rate
 
     def jog(self, joint: int, rate: float, seconds: float, goes_on: Callable[[], bool] | None = None) -> None:
-        """Move one joint [rad/s | mm/s] for a time, from where it stands to its limit at most.
+        """Move one joint at a rate [rad/s | mm/s] for a time, at most to its limit.
 
-        goes_on: asked again and again; the motion ends when it says no. `ready_to_jog` comes first.
+        goes_on: called again and again; the motion ends when it returns False. Call `ready_to_jog` first.
         """
-        arm, left = self.arm, seconds
-        while left > 0 and (goes_on is None or goes_on()):
-            piece = left if goes_on is None else min(JOG_PIECE, left)
+        arm, seconds_left = self.arm, seconds
+        while seconds_left > 0 and (goes_on is None or goes_on()):
+            piece_time = seconds_left if goes_on is None else min(JOG_PIECE, seconds_left)
             counts = self.machine.counts()
-            standing = legal_with_same_pulses(arm, self.machine.joints())
-            goal = jog_goal(arm, standing, joint, rate * piece, refuse=left == seconds)
-            way = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
-            if not way.duration:
+            present = legal_with_same_pulses(arm, self.machine.joints())
+            goal = jog_goal(arm, present, joint, rate * piece_time, refuse=seconds_left == seconds)
+            move = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
+            if not move.duration:
                 return  # the joint stands at its limit, or before a keep-out
-            self.machine.run([self.lay(Trajectory(arm, way.start, (way,)), np.array(counts))])
-            left -= piece
+            self.machine.run([self.lay(Trajectory(arm, move.start, (move,)), np.array(counts))])
+            seconds_left -= piece_time
 
     # Capabilities
 
@@ -235,10 +235,10 @@ class Board(ABC):
             raise UsageError(self.lacks.get(capability) or f"{self.called} does not {CAPABILITIES[capability]}")
 
     def check_home(self, joints: Sequence[str] = (), *, rest_at_home: bool = False) -> None:
-        """Raise UsageError, before a port is opened, for what does not home, or not this arm, or not so."""
+        """Raise UsageError, before a port is opened, if the board cannot home this arm or these joints alone."""
         self.require("home")
-        if extra := [*joints, *["rest at home"] * rest_at_home]:
-            raise UsageError(f"boards of kind {self.kind} home all joints at once: leave {' '.join(extra)} out")
+        if unsupported := [*joints, *["rest at home"] * rest_at_home]:
+            raise UsageError(f"boards of kind {self.kind} home all joints at once: leave {' '.join(unsupported)} out")
 
     def home(
         self,
@@ -247,9 +247,9 @@ class Board(ABC):
         *,
         rest_at_home: bool = False,
     ) -> list[LostSteps] | None:
-        """Find the limit switches of joints (all, by default); what they tell of the counts, where they do.
+        """Find the limit switches of joints, by default of all; returns the errors of the counts, if measured.
 
-        rest_at_home: joints without a switch stand in their home pose, on the operator's word.
+        rest_at_home: the operator states that joints without a switch stand in their home pose.
         """
         self.require("home")
         raise NotImplementedError
@@ -264,7 +264,7 @@ class Board(ABC):
         return gripper
 
     def grip_value(self, value: str | float) -> float:
-        """Where the gripper is to go: open, closed, or a value between them. Raises UsageError for others."""
+        """The target value of the gripper: open, closed, or a value between them. Raises UsageError for others."""
         gripper = self.gripper()
         low, high = sorted((gripper.open, gripper.closed))
         target = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
@@ -273,39 +273,39 @@ class Board(ABC):
         return target
 
     def check_grip(self, value: str | float) -> None:
-        """Raise UsageError if the arm has no gripper, or it cannot go there."""
+        """Raise UsageError if the arm has no gripper, or the value is out of its range."""
         self.grip_value(value)
 
     def grip_known(self) -> bool:
-        """Whether the gripper may be moved without somebody's word for where it stands."""
+        """Whether the gripper's position is known, so that it may move."""
         return True
 
     def grip(self, value: str | float, assume: str | float | None = None) -> Gripped:
-        """Move the gripper, and return where it comes to rest; assume: where a lost one stands."""
+        """Move the gripper, and return where it comes to rest; assume: the position of a lost gripper."""
         self.gripper()
         self.require("grip")
         raise NotImplementedError
 
     def relax(self) -> None:
-        """Switch the motors off: the arm can be moved by hand, and falls if nobody holds it."""
+        """Switch the motors off, so that the arm can be moved by hand, and falls if nobody holds it."""
         self.require("relax")
 
     def zero(self, gripper: float | None) -> tuple[list[int], tuple[int, int] | None]:
-        """Counts of the arm's motors; and the gripper's count, and its `zero` if it stands at a value."""
+        """Counts of the motors, and the gripper's count with its `zero` if it stands at the value `gripper`."""
         self.require("zero")
         raise NotImplementedError
 
     def calibration(self, path: str, pose: Array | None) -> Any:
-        """What another program's calibration file says of the arm; pose: (n,) in the middle of all ranges."""
+        """Read another program's calibration file for the arm; pose: (n,) in the middle of all ranges."""
         self.require("calibration")
 
     def settings(self) -> list[dict[str, Any]]:
-        """Settings that are not as the robot file wants them, as JSON: setting, found, wanted, ..."""
+        """Settings that differ from the robot file, as JSON: setting, found, wanted, ..."""
         self.require("settings")
         raise NotImplementedError
 
     def write_settings(self) -> None:
-        """Write the settings that differ, and read them back; the position is lost with it."""
+        """Write the settings that differ, and read them back; the board loses its position."""
         self.require("write_settings")
 
     def recall(self) -> Any:

@@ -1,7 +1,7 @@
-"""What a robot file still lacks for `pulses`, for motion in simulation and on a board, and for homing.
+"""Finds what a robot file lacks for `pulses`, for motion in simulation and on a board, and for homing.
 
-Each lack is told in words and, where that can be, with lines for the file. Their figures are examples: they load,
-and the motor's own stand in its data sheet.
+Each missing key comes with a text and, where possible, with lines to add to the file. The figures in these lines are
+examples that load; the right ones are in the motor's data sheet.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.robot_keys import Board, Drive
 
-Lack = tuple[str, list[str]]  # what is missing in words, and lines to add
+Lack = tuple[str, list[str]]  # text of what is missing, and lines to add
 _DRIVER = "A4988"  # driver named in lines to add
 
 
 def missing_by_command(arm: Arm) -> dict[str, list[str]]:
-    """What each of `pulses`, `simulate`, `send` and `home` lacks, in words; an empty list: nothing.
+    """What the robot file lacks for `pulses`, `simulate`, `send` and `home`, in words; an empty list for nothing.
 
     >>> import armkin
     >>> found = missing_by_command(armkin.load("three_dof"))
@@ -46,7 +46,7 @@ def missing_for_motion(arm: Arm, *, board: bool = True) -> list[str]:
 
 
 def lines_to_add(arm: Arm) -> list[str]:
-    """Lines for the robot file of an arm that shall move on a board."""
+    """Lines to add to a robot file so that its arm moves on a board."""
     return [line for _, added in find_lacks(arm) for line in added]
 
 
@@ -56,27 +56,27 @@ def find_lacks(arm: Arm, *, board: bool = True) -> list[Lack]:
 
 
 def _without_rates(arm: Arm, board: bool) -> list[Lack]:
-    """Missing drives and rates: what a plan needs."""
+    """Missing drives and rates, which every plan needs."""
     lacks_found: list[Lack] = []
     try:
         joints_per_pulse(arm)  # raises if a joint has no motor
     except UsageError as error:
-        still = undriven_joints(arm)
+        undriven = undriven_joints(arm)
         lacks_found.append(
-            (_lack_text(arm, still, "drive"), _drive_lines(arm, still, board)) if still else (str(error), [])
+            (_lack_text(arm, undriven, "drive"), _drive_lines(arm, undriven, board)) if undriven else (str(error), [])
         )
-    absent = missing_rates(arm)
-    lacks_found += [(_lack_text(arm, names, key), []) for key, names in absent.items()]
-    if absent:
+    rates = missing_rates(arm)
+    lacks_found += [(_lack_text(arm, names, key), []) for key, names in rates.items()]
+    if rates:
         lacks_found[-1] = (lacks_found[-1][0], rate_lines(arm))
     return lacks_found
 
 
 def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
-    """A stepper for each joint without a motor; board: with an axis of its own."""
+    """Lines with a stepper for each joint without a motor; board: with an axis of its own."""
     axes = list(_axis_names(arm)) if board else []
-    taken = {motor.axis for motor in arm.motors}
-    free = iter([axis for axis in axes if axis not in taken])
+    used = {motor.axis for motor in arm.motors}
+    free = iter([axis for axis in axes if axis not in used])
     groups: dict[str, list[str]] = {}
     for name in joints:
         lead = ", lead: 8" if arm.prismatic[arm.joint_names.index(name)] else ""
@@ -102,7 +102,7 @@ def _board_for(arm: Arm) -> str:
 
 
 def without_board(arm: Arm) -> list[Lack]:
-    """Missing board, driver, axes: what a board needs."""
+    """A missing board, driver or axis, which motion on a board needs."""
     if arm.board is None:
         kind = _board_for(arm)
         driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven_joints(arm) else ""
@@ -114,11 +114,11 @@ def without_board(arm: Arm) -> list[Lack]:
 
 def _without_foreign_axes(arm: Arm, foreign: ForeignBoard) -> list[Lack]:
     """Missing axes of a board that has its own drivers and settings."""
-    bare = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
-    if not bare:
+    without_axis = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
+    if not without_axis:
         return []
-    add = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(bare)} ({', '.join(foreign.axes)})"
-    return [(f"motors {', '.join(bare)} have no axis", [add])]
+    line = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(without_axis)} ({', '.join(foreign.axes)})"
+    return [(f"motors {', '.join(without_axis)} have no axis", [line])]
 
 
 def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
@@ -129,21 +129,21 @@ def _without_driver(arm: Arm, settings: Board) -> list[Lack]:
     driven += [] if arm.gripper is None else [("the gripper", arm.gripper)]
     for owner, motor in driven:
         if motor.axis is None:
-            free = board.servos if motor.kind == "servo" else board.steppers
-            add = f"axis: {(*free, '?')[0]}   # into the drive of {owner} ({', '.join(free)})"
-            lacks_found.append((f"{owner} has no axis", [add]))
+            axes = board.servos if motor.kind == "servo" else board.steppers
+            addition = f"axis: {(*axes, '?')[0]}   # into the drive of {owner} ({', '.join(axes)})"
+            lacks_found.append((f"{owner} has no axis", [addition]))
     if settings.driver is None and any(motor.kind == "stepper" for _, motor in driven):
-        why = "its board has no driver: it sets the pulse timing"
+        text = "its board has no driver: it sets the pulse timing"
         keys = {**settings.model_dump(exclude_none=True), "driver": _DRIVER}
         line = f"board: {{{', '.join(f'{key}: {value}' for key, value in keys.items())}}}"
-        lacks_found.append((why, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
+        lacks_found.append((text, [f"{line}   # for example, in place of board:; drivers: {', '.join(DRIVERS)}"]))
     return lacks_found
 
 
 def _without_drives(arm: Arm) -> list[str]:
-    still = undriven_joints(arm)
-    if still:
-        return [_lack_text(arm, still, "drive")]
+    undriven = undriven_joints(arm)
+    if undriven:
+        return [_lack_text(arm, undriven, "drive")]
     try:
         joints_per_pulse(arm)
     except UsageError as error:
@@ -154,8 +154,8 @@ def _without_drives(arm: Arm) -> list[str]:
 def _without_homing(arm: Arm) -> list[str]:
     if arm.motors and all(motor.kind == "bus" for motor in arm.motors):
         return []  # bus servos know where they are
-    bare = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
-    return [_lack_text(arm, bare, "homing")] if bare else []
+    without_homing = [name for name, homing in zip(arm.joint_names, arm.homing, strict=True) if homing is None]
+    return [_lack_text(arm, without_homing, "homing")] if without_homing else []
 
 
 def _lack_text(arm: Arm, names: list[str], key: str) -> str:

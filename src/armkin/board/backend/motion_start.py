@@ -1,7 +1,7 @@
-"""Where a motion begins: at the counts that the board gave, whatever its kind.
+"""Checks that a motion begins at the counts that its board reports, for every kind of board.
 
 Every trajectory that becomes counts passes through `check_start`, and every plan that a board is about to carry out
-through `from_counts`. What a motion may not do as a whole is refused in `check_start`, too: before anything moves.
+through `from_counts`. `check_start` also refuses motions that hit something or leave the limits, before the arm moves.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-_SAMPLES = 256  # samples of a curve that begins outside the limits
+_SAMPLES = 256  # samples of a curve that are tested if it begins outside the limits
 
 
 class StartError(RuntimeError):
-    """A plan does not begin where the arm stands: a bug in armkin, found before anything has moved."""
+    """A plan does not begin at the arm's position: a bug in armkin, found before the arm has moved."""
 
 
 @dataclass(frozen=True)
@@ -47,44 +47,44 @@ class StartedTrajectory:
 def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
     """Raise if a trajectory may not be carried out from counts (motors,).
 
-    StartError: it begins elsewhere. NoSolutionError, naming joint, value and limit: it begins outside the limits,
-    and takes a joint farther out, or it is not proved free of keep-outs.
+    Raises StartError if it begins elsewhere; NoSolutionError, naming joint, value and limit, if it begins outside the
+    limits and takes a joint farther out, or if it is not proved free of keep-outs.
     """
     arm = trajectory.arm
-    first = pulses(arm, trajectory.start)
-    # Of more motors than joints the joints are a least squares fit, which may round to the next count.
-    if np.abs(first - start).max(initial=0) > (len(arm.motor_gain) > arm.n):
-        raise StartError(f"a plan that begins at {first.tolist()} counts was made for an arm at {list(start)}")
+    first_counts = pulses(arm, trajectory.start)
+    # With more motors than joints, joint values are a least-squares fit, which may round to the next count.
+    if np.abs(first_counts - start).max(initial=0) > (len(arm.motor_gain) > arm.n):
+        raise StartError(f"a plan that begins at {first_counts.tolist()} counts was made for an arm at {list(start)}")
     check_free(trajectory)
     excess = excess_over_limits(arm, trajectory.start)
     if not excess.any():
         return
     for stretch in trajectory.stretches:
         times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
-        reached = stretch.evaluate(np.asarray(times, dtype=float))
-        farther = excess_over_limits(arm, reached).max(axis=0) > excess + SLACK
+        q = stretch.evaluate(np.asarray(times, dtype=float))
+        farther = excess_over_limits(arm, q).max(axis=0) > excess + SLACK
         if farther.any():
             raise _farther_out_error(arm, int(farther.argmax()), trajectory.start)
 
 
-def jog_goal(arm: Arm, standing: Array, joint: int, change: float, *, refuse: bool) -> Array:
-    """Where a joint may go from here, (n,), by a change: to its limit, and to two steps before what it would hit.
+def jog_goal(arm: Arm, present: Array, joint: int, change: float, *, refuse: bool) -> Array:
+    """The joint values (n,) after a change of one joint, stopped at its limit and two steps before a hit.
 
-    refuse: raise NoSolutionError if something is hit at once.
+    refuse: raise NoSolutionError if the joint cannot move at all before a hit.
     """
-    goal, end = standing.copy(), (arm.upper if change > 0 else arm.lower)[joint]
-    goal[joint] = np.clip(standing[joint] + change, *sorted((standing[joint], end)))
-    free, why = free_way(arm, standing, goal)
-    if why is None:
+    goal, end = present.copy(), (arm.upper if change > 0 else arm.lower)[joint]
+    goal[joint] = np.clip(present[joint] + change, *sorted((present[joint], end)))
+    free_share, hit_error = free_way(arm, present, goal)
+    if hit_error is None:
         return goal
-    step = float(resolution(arm)[joint] / abs(goal[joint] - standing[joint]))
-    if free <= 2 * step and refuse:
-        raise why
-    return np.asarray(standing + max(free - 2 * step, 0.0) * (goal - standing))
+    step = float(resolution(arm)[joint] / abs(goal[joint] - present[joint]))
+    if free_share <= 2 * step and refuse:
+        raise hit_error
+    return np.asarray(present + max(free_share - 2 * step, 0.0) * (goal - present))
 
 
 def check_jog(arm: Arm, q: Array, joint: int, rate: float) -> None:
-    """Raise NoSolutionError if a joint that stands outside its limits, arm at q (n,), is to move farther out."""
+    """Raise NoSolutionError if a joint of an arm at q (n,) is outside its limits and would move farther out."""
     if excess_over_limits(arm, q)[joint] > 0 and (q[joint] > arm.upper[joint]) == (rate > 0):
         raise _farther_out_error(arm, joint, q)
 
@@ -99,7 +99,7 @@ def _farther_out_error(arm: Arm, joint: int, q: Array) -> NoSolutionError:
 
 
 def excess_over_limits(arm: Arm, q: Array) -> Array:
-    """How far joints are outside their limits: (..., n) [rad | mm]; 0 inside, and for half a step outside."""
+    """How far joints are outside their limits: (..., n) [rad | mm]; half a step outside still counts as 0."""
     values = legal_with_same_pulses(arm, q)
     return np.abs(values - np.clip(values, arm.lower, arm.upper))
 
@@ -115,29 +115,29 @@ def why_impossible(arm: Arm, counts: Sequence[int]) -> str | None:
         q = joints(arm, counts)
     except UsageError as error:  # motors of one joint contradict each other
         return error.message
-    most = np.where(arm.prismatic, arm.upper - arm.lower, TURN)
-    for k in np.flatnonzero(np.abs(q - np.clip(q, arm.lower, arm.upper)) > most + SLACK):
-        far = "its travel" if arm.prismatic[k] else "a whole turn"
-        return f"{outside_text(arm, int(k), float(q[k]))} by more than {far}"
+    max_excess = np.where(arm.prismatic, arm.upper - arm.lower, TURN)
+    for joint in np.flatnonzero(np.abs(q - np.clip(q, arm.lower, arm.upper)) > max_excess + SLACK):
+        distance = "its travel" if arm.prismatic[joint] else "a whole turn"
+        return f"{outside_text(arm, int(joint), float(q[joint]))} by more than {distance}"
     return None
 
 
 def from_counts(
     plans: Iterable[Any], counts: Callable[[], Sequence[int]], *, tolerance: int | None = None
 ) -> Iterator[Any]:
-    """Pass plans on that begin where the arm stands: the first at `counts()`, each other where the one before it ends.
+    """Pass plans on, checking that the first begins at `counts()` and each other one at the end of the one before.
 
-    tolerance: [counts] of a kind that measures where it stands, and does so before each plan. None in between:
-    nothing to do yet. Raises StartError for a plan that begins elsewhere.
+    tolerance: [counts] for kinds that measure their position, which is then read before each plan. A None among the
+    plans is passed on. Raises StartError for a plan that begins elsewhere.
     """
-    standing: NDArray[np.int64] | None = None
+    last: NDArray[np.int64] | None = None
     for plan in plans:
         if plan is not None:
-            expected = np.asarray(counts() if standing is None or tolerance is not None else standing, dtype=np.int64)
+            expected = np.asarray(counts() if last is None or tolerance is not None else last, dtype=np.int64)
             if np.abs(plan.start - expected).max(initial=0) > (tolerance or 0):
                 raise StartError(
                     f"a plan begins at {plan.start.tolist()} counts, the arm stands at {expected.tolist()}"
                 )
-            standing = plan.end
+            last = plan.end
             LOG.info("motion from %s to %s in %.3f s", plan.start.tolist(), plan.end.tolist(), plan.duration)
         yield plan

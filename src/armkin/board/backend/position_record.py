@@ -1,8 +1,8 @@
-"""What armkin last left on a board that other programs write to, beside the port's lock.
+"""A record, beside the port's lock, of the state in which armkin left a board that other programs use, too.
 
-Such a board (GRBL, Klipper) obeys everybody, and tells none who it was. Its position is known only while all that it
-keeps is what armkin last left there; in a motion, while it stands on that motion's way. The record outlives the
-process. That the board was reset since is told by marks that a reset clears.
+Such a board (GRBL, Klipper) obeys every program and does not say which one moved it. Its position counts as known only
+while its settings and position are those that armkin left, or while it stands on the path of armkin's motion. The
+record outlives the process. Marks that a reset clears show whether the board was reset since.
 """
 
 from __future__ import annotations
@@ -26,24 +26,24 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.model.arm import Arm
 
-Marks = Mapping[str, Sequence[float] | str]  # what a board keeps, by name, as it says it
-_MAX_BYTES = 64_000_000  # size [bytes], at most, of a record, and of its plan
-_PLAN_DISTANCE = 1.0 + 1e-9  # distance [counts] from a plan within which every motor on it is; no count lies just there
+Marks = Mapping[str, Sequence[float] | str]  # values that a board keeps, by name
+_MAX_BYTES = 64_000_000  # largest size [bytes] of a record and of its plan
+_PLAN_DISTANCE = 1.0 + 1e-9  # largest distance [counts] of each motor from a plan that the arm is on
 
 
 @dataclass(frozen=True)
 class BoardNote:
-    """What was left on a board."""
+    """The state in which a board was left."""
 
-    arm: str  # digest of what makes joint values of counts
+    arm: str  # digest of the conversion from counts to joint values
     marks: dict[str, list[float] | str]
-    offset: list[int]  # the board's own steps where the arm's counts are 0
-    counts: list[int]  # where the arm stood, or where its motion began
-    plan: NDArray[np.int64] | None = None  # (points, motors) [counts] corners of the way of the motion under way
+    offset: list[int]  # the board's own steps at which the arm's counts are 0
+    counts: list[int]  # position of the arm, or the start of its motion
+    plan: NDArray[np.int64] | None = None  # (points, motors) [counts] corners of the motion in progress
 
 
 class Record:
-    """The record of one arm on one port; a board in this process has none that outlives it."""
+    """The record of one arm on one port; that of a simulated board is not written to a file."""
 
     def __init__(self, port: Port, arm: Arm) -> None:
         self._path = None if port.simulated else record_path(port.name)
@@ -51,47 +51,47 @@ class Record:
         self.note = None if self._path is None else _read_record(self._path)
 
     def write_position(self, marks: Marks, counts: Sequence[int], offset: Sequence[int]) -> None:
-        """The arm stands there, by armkin's own doing or somebody's word."""
-        plain_marks = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
-        self._write(BoardNote(_arm_digest(self._arm), plain_marks, list(map(int, offset)), list(map(int, counts))))
+        """Record the arm's position, reached by armkin or stated by the operator."""
+        marks_copy = {name: value if isinstance(value, str) else list(value) for name, value in marks.items()}
+        self._write(BoardNote(_arm_digest(self._arm), marks_copy, list(map(int, offset)), list(map(int, counts))))
 
     def write_motion(self, job: Job, piece: float) -> None:
-        """A motion begins, of which curves are sent in pieces of so many seconds."""
+        """Record that a motion begins, whose curves are sent in pieces of `piece` seconds."""
         assert self.note is not None
-        left = self.note
-        self._write(BoardNote(left.arm, left.marks, left.offset, job.start.tolist(), path_corners(job, piece)))
+        note = self.note
+        self._write(BoardNote(note.arm, note.marks, note.offset, job.start.tolist(), path_corners(job, piece)))
 
     def forget(self) -> None:
-        """Nobody knows where the arm stands."""
+        """Delete the record: the position is unknown."""
         self.note = None
         if self._path is not None:
             remove_note(self._path)
 
     def differs(self, marks: Marks) -> str | None:
-        """What the board keeps that armkin did not leave there, in words; None: nothing."""
-        why = "the board was reset, or another program has set it"
-        left = self.note
-        if left is None:
+        """How the board's values differ from those that armkin left, in words; None: they do not."""
+        cause = "the board was reset, or another program has set it"
+        note = self.note
+        if note is None:
             return "nobody has told armkin on this computer where it stands"
-        if left.arm != _arm_digest(self._arm) or len(left.offset) != len(self._arm.motor_gain):
+        if note.arm != _arm_digest(self._arm) or len(note.offset) != len(self._arm.motor_gain):
             return "the robot file's drives or home pose are others than when it was told"
-        for name in sorted({*marks, *left.marks}):
-            value, value_left = _comparable_value(marks.get(name)), _comparable_value(left.marks.get(name))
+        for name in sorted({*marks, *note.marks}):
+            value, value_left = _comparable_value(marks.get(name)), _comparable_value(note.marks.get(name))
             if value != value_left:
-                return f"{name} is {_value_text(value)}, and armkin left {_value_text(value_left)}: {why}"
+                return f"{name} is {_value_text(value)}, and armkin left {_value_text(value_left)}: {cause}"
         return None
 
     def moved_text(self, counts: Sequence[int]) -> str | None:
-        """How the arm stands elsewhere than armkin left it, in words; None: it does not."""
-        left = self.note
-        assert left is not None
-        standing = np.asarray(counts, dtype=np.int64)
-        if standing.tolist() == left.counts or (left.plan is not None and is_on_path(left.plan, standing)):
+        """How the arm's position differs from where armkin left it, in words; None: it does not."""
+        note = self.note
+        assert note is not None
+        present = np.asarray(counts, dtype=np.int64)
+        if present.tolist() == note.counts or (note.plan is not None and is_on_path(note.plan, present)):
             return None
-        place_left = (
-            f"at {left.counts}" if left.plan is None else f"on a motion from {left.counts} to {left.plan[-1].tolist()}"
+        last_place = (
+            f"at {note.counts}" if note.plan is None else f"on a motion from {note.counts} to {note.plan[-1].tolist()}"
         )
-        return f"it stands at {standing.tolist()} steps, and armkin left it {place_left}: another program has moved it"
+        return f"it stands at {present.tolist()} steps, and armkin left it {last_place}: another program has moved it"
 
     def _write(self, note: BoardNote) -> None:
         self.note = note
@@ -102,7 +102,7 @@ class Record:
 
 
 def path_corners(job: Job, piece: float) -> NDArray[np.int64]:
-    """Corners (points, motors) [counts] of the way of a job whose curves are sent in pieces of so many seconds."""
+    """Corners (points, motors) [counts] of a job whose curves are sent in pieces of `piece` seconds."""
     arm, points = job.trajectory.arm, [np.asarray(job.start, dtype=np.int64)[None]]
     for stretch in job.trajectory.stretches:
         count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / piece)), 1)
@@ -121,7 +121,7 @@ def is_on_path(points: NDArray[np.int64], counts: NDArray[np.int64]) -> bool:
         return bool(np.abs(counts - points[0]).max(initial=0) <= _PLAN_DISTANCE)
     line, offset = np.diff(points, axis=0), counts - points[:-1]
     with np.errstate(divide="ignore"):
-        # Shares of the line at which a motor is near.
+        # shares of each line between which a motor is near it
         ends = np.stack([(offset - _PLAN_DISTANCE) / line, (offset + _PLAN_DISTANCE) / line])
     first, last = ends.min(axis=0).max(axis=1, initial=0.0), ends.max(axis=0).min(axis=1, initial=1.0)
     return bool((first <= last).any())
@@ -156,7 +156,7 @@ def _unpack_plan(text: str, motors: int) -> NDArray[np.int64]:
 
 
 def _read_record(path: str) -> BoardNote | None:
-    """What a record says, if it is one."""
+    """The note in a record file, or None if it is not valid."""
     record = read_note(path, _MAX_BYTES)
     if record is None:
         return None

@@ -1,4 +1,4 @@
-"""A trajectory for a board that is sent positions, not segments."""
+"""Trajectories for boards that take positions instead of segments."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Job(StartedTrajectory):
-    """A trajectory that starts at counts `start` (motors,), sent in so many `segments`: lines or positions."""
+    """A trajectory that starts at counts `start` (motors,); segments: number of lines or positions to send."""
 
     segments: int
 
@@ -50,7 +50,7 @@ def plan_targets(arm: Arm, start: Sequence[int], targets: Array, speed: float) -
 
 
 def braking_time(trajectory: Trajectory) -> float:
-    """Seconds in which the whole motion is slowed down to a stop, within the joints' max_accel; gently on curves."""
+    """The time [s] to slow the motion down to a stop within the joints' max_accel, or BRAKE_SHARE of it on curves."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        needed = trajectory.top_speed / trajectory.arm.max_accel
-    return float(np.nanmax(needed, initial=0.0)) / min(map(brake_share, trajectory.stretches), default=1.0)
+        seconds = trajectory.top_speed / trajectory.arm.max_accel
+    return float(np.nanmax(seconds, initial=0.0)) / min(map(brake_share, trajectory.stretches), default=1.0)

@@ -1,7 +1,7 @@
-"""An arm of bus servos, which know where they stand at all times.
+"""An arm of bus servos, whose absolute encoders always know the position.
 
-The host streams positions along the trajectory, each a little ahead of the moment it is meant for, to all servos
-at once; the servos' own regulators follow. A lost packet is made up for by the next.
+The host streams positions along the trajectory to all servos at once, each a little ahead of its time, and the servos'
+own controllers follow them. A lost packet does no harm, since the next one carries a newer position.
 """
 
 from __future__ import annotations
@@ -28,22 +28,22 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
-SEND_PERIOD = 0.02  # time [s] between two positions sent
-MAX_OVERRUN = 0.05  # time [s] that one position goes on at most: a program that was late does not cut across its path
-WATCH_PERIOD = 0.1  # time [s] between readings of position and errors in motion
-MAX_LAG = 400  # distance [counts] behind the trajectory, 35 degrees, at which a servo counts as blocked
-SETTLED_DISTANCE = 12  # distance [counts] from the goal, 1 degree, at which a move has arrived
-START_DISTANCE = 2 * SETTLED_DISTANCE  # distance [counts] of a start from where the servos stand: they sag under load
-SETTLING_TIME = 1.0  # time [s] that a move may take to arrive after its end
+SEND_PERIOD = 0.02  # time [s] between two positions that are sent
+MAX_OVERRUN = 0.05  # longest time step [s]: after a delay the arm must not cut across its path
+WATCH_PERIOD = 0.1  # time [s] between two readings of positions and errors during motion
+MAX_LAG = 400  # lag [counts], 35 degrees, at which a servo counts as blocked
+SETTLED_DISTANCE = 12  # distance [counts] from the goal, 1 degree, that counts as arrived
+START_DISTANCE = 2 * SETTLED_DISTANCE  # distance [counts] allowed at a start, as servos sag under load
+SETTLING_TIME = 1.0  # longest time [s] from the end of a move to its arrival
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-    """A trajectory from counts `start` (motors,) on, as positions."""
+    """The job of a trajectory from counts `start` (motors,) on."""
     return Job(trajectory, start, int(np.ceil(trajectory.duration / SEND_PERIOD)))
 
 
 def servo_ids(arm: Arm) -> list[int]:
-    """Numbers of the arm's servos on their bus, in the motors' order. Raises UsageError for other motors."""
+    """The bus ids of the arm's servos, in the motors' order. Raises UsageError for other motors."""
     robot_file = arm.path or arm.name
     motors = arm.motors
     if not motors:
@@ -63,7 +63,7 @@ def servo_ids(arm: Arm) -> list[int]:
 class ServoArm(Backend):
     """An arm of bus servos behind an open port, of any make."""
 
-    firmware: str  # what `armkin status` calls them
+    firmware: str  # the firmware field of `armkin status`
     limits_at: str  # where the servos keep their own limits
     differences: tuple[str, ...]
 
@@ -82,15 +82,15 @@ class ServoArm(Backend):
         self._limits = self._own_limits()
         self._read()
 
-    # Where it stands
+    # Position
 
     def position(self) -> Position:
-        """Always known: the servos' encoders are absolute."""
+        """Return "known", as the servos' encoders are absolute."""
         return "known"
 
     @property
     def loss_reason(self) -> str:
-        """Nothing: the position is never lost."""
+        """Return an empty text, as the position is never lost."""
         return ""
 
     def counts(self) -> tuple[int, ...]:
@@ -128,13 +128,13 @@ class ServoArm(Backend):
     # Getting ready
 
     def prepare(self, *, assume: Array | None = None) -> bool:
-        """Switch the motors on where they stand; False: the position is always known."""
+        """Switch the motors on at their present positions; returns False, as the position is never lost."""
         if assume is not None:
             joints = joints_out(self.arm, self.joints()).tolist()
             raise PositionKnownError("bus servos know their position: there is nothing to assume", joints=joints)
         self._read()
         self._check()
-        self._send(self._counts, np.zeros(len(self.ids)))  # no servo may jump to an old goal
+        self._send(self._counts, np.zeros(len(self.ids)))  # the present position, so that no servo jumps to an old goal
         for number, count in zip(self.ids, self._counts, strict=True):
             self.bus.write(number, self.bus.GOAL_POSITION, int(count))
         self.bus.torque(self.ids, on=True)
@@ -161,15 +161,15 @@ class ServoArm(Backend):
 
     def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,). Raises NoSolutionError as `_check_limits` does."""
-        made = job(trajectory, start)
-        self._check_limits(made)
-        return made
+        servo_job = job(trajectory, start)
+        self._check_limits(servo_job)
+        return servo_job
 
     def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> None:
         """Carry out jobs; at each end wait until the servos have arrived. Raises LinkError, StoppedError."""
         total = elapsed = 0.0
-        for ahead_job in filter(None, plans if isinstance(plans, list) else ()):
-            self._check_limits(ahead_job)  # all of them, before anything moves
+        for queued_job in filter(None, plans if isinstance(plans, list) else ()):
+            self._check_limits(queued_job)  # check all jobs before the arm moves
         for job in from_counts(plans, self._measured, tolerance=START_DISTANCE):
             if job is None:
                 self._heed()
@@ -183,52 +183,52 @@ class ServoArm(Backend):
             progress(elapsed, total)
 
     def hold(self) -> None:
-        """Stay where the arm stands."""
+        """Stay at the present position."""
         self._read()
         for number, count in zip(self.ids, self._counts, strict=True):
             self.bus.write(number, self.bus.GOAL_POSITION, int(count))
 
     def _check_limits(self, job: Job) -> None:
-        """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out where it stands so."""
+        """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out if it starts outside."""
         low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
         for stretch in job.trajectory.stretches:
             count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / SEND_PERIOD)), 1)
             goals = pulses(self.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
             for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
-                least, most = self._limits[k].tolist()
+                lower, upper = self._limits[k].tolist()
                 raise NoSolutionError(
                     f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {goals[row, k]} counts is outside its own "
-                    f"limits {least} to {most} ({self.limits_at}): nothing was moved"
+                    f"limits {lower} to {upper} ({self.limits_at}): nothing was moved"
                 )
 
     def _follow(self, trajectory: Trajectory, report: Callable[[float], None]) -> None:
-        """Stream a trajectory in real time; a stop slows its time down, so that the arm stays on its path."""
-        last = watched = self.port.now()
+        """Stream a trajectory in real time; a stop slows the plan's time down, so that the arm stays on its path."""
+        last = last_check = self.port.now()
         t, pace, stopping = 0.0, 1.0, False
         ramp = max(braking_time(trajectory), SEND_PERIOD)
         while t < trajectory.duration and pace > 0.0:
-            present = self.port.now()
-            if present - last < SEND_PERIOD - 1e-4:
-                self.port.read(SEND_PERIOD - (present - last))
+            time = self.port.now()
+            if time - last < SEND_PERIOD - 1e-4:
+                self.port.read(SEND_PERIOD - (time - last))
                 continue
             stopping = stopping or self._stop()
-            passed, last = min(present - last, MAX_OVERRUN), present
+            step, last = min(time - last, MAX_OVERRUN), time
             if stopping:
-                pace = max(0.0, pace - passed / ramp)
-            t = min(trajectory.duration, t + passed * pace)
-            ahead = min(trajectory.duration, t + SEND_PERIOD * pace)
-            self._send(pulses(self.arm, trajectory.q(ahead)), np.abs(self.arm.motor_gain @ trajectory.qd(ahead)))
+                pace = max(0.0, pace - step / ramp)
+            t = min(trajectory.duration, t + step * pace)
+            t_sent = min(trajectory.duration, t + SEND_PERIOD * pace)
+            self._send(pulses(self.arm, trajectory.q(t_sent)), np.abs(self.arm.motor_gain @ trajectory.qd(t_sent)))
             report(t)
-            if present - watched > WATCH_PERIOD:
-                watched = present
+            if time - last_check > WATCH_PERIOD:
+                last_check = time
                 self._watch(pulses(self.arm, trajectory.q(t)))
         if stopping:
             self.hold()
             raise StoppedError
 
     def _arrive(self, end: NDArray[np.int64]) -> None:
-        """Wait until all servos are where the move ends, sending the goal again."""
-        limit = self.port.now() + SETTLING_TIME
+        """Send the goal until all servos have arrived. Raises LinkError for a servo that does not arrive in time."""
+        deadline = self.port.now() + SETTLING_TIME
         while True:
             self._send(end, np.zeros(len(self.ids)))
             self.port.read(SEND_PERIOD)
@@ -237,7 +237,7 @@ class ServoArm(Backend):
             distance = np.abs(self._counts - end)
             if distance.max() <= SETTLED_DISTANCE:
                 return
-            if self.port.now() > limit:
+            if self.port.now() > deadline:
                 k = int(distance.argmax())
                 self.hold()
                 raise LinkError(
@@ -281,23 +281,23 @@ class ServoArm(Backend):
 
     @abstractmethod
     def _own_limits(self) -> NDArray[np.int64]:
-        """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
+        """The limits that are stored in the servos: (motors, 2) [counts]."""
 
     @abstractmethod
     def _read(self) -> None:
-        """Read where the servos stand, `_counts`, and what else they tell, `_states`."""
+        """Read the servos' positions into `_counts` and their other values into `_states`."""
 
     @abstractmethod
     def _send(self, counts: NDArray[np.int64], rates: Array) -> None:
-        """Goal positions for all servos at one moment, with the rates [counts/s] that reach them; 0: at once."""
+        """Send goal positions to all servos at once, with the rates [counts/s] to go there; 0: full speed."""
 
     @abstractmethod
     def _faults(self, number: int) -> list[str]:
-        """What a servo says is wrong with it, by its last answer."""
+        """The faults in a servo's last answer."""
 
     @abstractmethod
     def _servo_report(self, number: int) -> dict[str, Any]:
-        """What a servo says of itself, by its last state: load_percent, voltage, temperature."""
+        """The fields of a servo's last state: load_percent, voltage, temperature."""
 
 
 def _report_progress(progress: Progress, elapsed: float, total: float, t: float) -> None:

@@ -1,7 +1,7 @@
-"""An arm of steppers on a board that obeys every program: its place is believed by the record of what armkin left.
+"""An arm of steppers on a board that obeys every program, so that its position needs armkin's own record.
 
-Such a kind says what it can drive, reads where the arm stands and why that means nothing, and carries out a job; where
-a motion begins and ends, who vouches for a lost place, and the words for it are here.
+A kind of board reads counts, finds reasons why they are lost, and carries out a job. This base class checks where a
+motion begins and ends, takes the operator's statement of a lost position, and writes the messages.
 """
 
 from __future__ import annotations
@@ -33,32 +33,33 @@ def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[in
     file = arm.path or arm.name
     if not arm.motors:
         raise UsageError(f"{file}: no joint has a drive")
-    speed = np.nan_to_num(np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed), posinf=0.0)  # all joints at once
+    # with all joints at full speed
+    speed = np.nan_to_num(np.abs(arm.motor_gain) @ np.nan_to_num(arm.max_speed), posinf=0.0)
     accel = np.nan_to_num(motor_accel(arm), posinf=0.0)
-    free = list(letters)
-    for k, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
+    unused = list(letters)
+    for number, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
         if motor.kind != "stepper":
             raise UsageError(f"{file}: motor {name} is a {motor.kind}; {called} drives steppers alone")
-        if motor.axis not in free:
+        if motor.axis not in unused:
             raise UsageError(
                 f"{file}: motor {name} is on axis {motor.axis}; {called} has {', '.join(letters)}, one motor on each"
             )
-        free.remove(motor.axis)
+        unused.remove(motor.axis)
         steps = motor.pulses_per_unit()
-        yield k, motor, name, steps, float(speed[k] / steps), float(accel[k] / steps)
+        yield number, motor, name, steps, float(speed[number] / steps), float(accel[number] / steps)
 
 
 class StepperArm(Backend):
     """An arm of steppers behind an open port."""
 
-    cure: ClassVar[str] = "put it in its home pose and say so"  # what cures a lost position
-    piece: ClassVar[float]  # [s] of a curve that one line is sent for
-    homes: ClassVar[bool] = False  # it can search switches
+    cure: ClassVar[str] = "put it in its home pose and say so"  # advice for a lost position
+    piece: ClassVar[float]  # [s] of a curve that is sent as one line
+    homes: ClassVar[bool] = False  # whether it can search limit switches
     _stop: Callable[[], bool]
     _record: Record  # what armkin last left on the board
 
     def position(self) -> Position:
-        """Known while all that the board keeps is what armkin left there."""
+        """Return "known" while the board's values are those that armkin left."""
         return "lost" if self.loss_reason else "known"
 
     def refresh(self) -> None:
@@ -76,7 +77,7 @@ class StepperArm(Backend):
         return {"settings": [str(difference) for difference in self.wrong()], "lost_because": self.loss_reason or None}
 
     def prepare(self, *, assume: Array | None = None) -> bool:
-        """Check settings and position; True if the position was lost: the arm stands at `assume` from now on."""
+        """Check settings and position; True if the position was lost and is now `assume`."""
         self._ready()
         if not self.loss_reason:
             if assume is not None:
@@ -94,9 +95,9 @@ class StepperArm(Backend):
         return True
 
     def run(self, plans: Iterable[Any], progress: Progress = lambda elapsed, total: None) -> None:
-        """Carry out jobs and compare the position at each end. Raises LinkError, StoppedError."""
+        """Carry out jobs, and compare the position at the end of each with its plan. Raises LinkError, StoppedError."""
         total = elapsed = 0.0
-        was_read = False  # where the arm stands was read just now
+        was_read = False  # whether the position is up to date
         for job in from_counts(plans, self.counts):
             if job is None:
                 if self._stop():
@@ -128,7 +129,7 @@ class StepperArm(Backend):
             progress(elapsed, total)
 
     def _begin(self, job: Job, *, position_read: bool) -> None:
-        """Make sure that the arm stands where a job starts, and record the motion."""
+        """Check that the arm is at the start of a job, and record the motion."""
         if not position_read:
             self._read()
         if self.loss_reason:
@@ -146,24 +147,24 @@ class StepperArm(Backend):
 
     @abstractmethod
     def wrong(self) -> Sequence[Any]:
-        """Settings that are not as the robot file wants them."""
+        """Settings that differ from the robot file."""
 
     @abstractmethod
     def vouch(self, counts: Sequence[int]) -> None:
-        """Take somebody's word that the motors stand at these counts."""
+        """Accept the operator's statement that the motors stand at these counts."""
 
     @abstractmethod
     def _read(self) -> None:
-        """Read where the arm stands."""
+        """Read the arm's position."""
 
     @abstractmethod
     def _ready(self) -> None:
-        """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
+        """Read the arm's position. Raises LinkError if settings or state forbid a motion."""
 
     @abstractmethod
     def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
-        """Carry out a job, to rest, and read where it stands; False: a stop was asked for. report: of seconds done."""
+        """Carry out a job and read the position at rest; False if it was stopped. report: takes the seconds done."""
 
     @abstractmethod
     def _explain(self, error: LinkError) -> LinkError:
-        """The error, with where the arm has come to rest."""
+        """The error, extended by the position at which the arm has come to rest."""

@@ -1,4 +1,4 @@
-"""A bus of servos: questions asked again until they are answered."""
+"""A bus of servos, whose requests are repeated until they are answered."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
 
 BAUD = 1_000_000  # rate [bit/s] of the bus
-_ANSWER_TIMEOUT = 0.02  # time [s] that a servo's answer may take; USB adapters hold bytes back for up to 16 ms
-_MAX_TRIES = 8  # times that a question is asked before a servo counts as gone
+_ANSWER_TIMEOUT = 0.02  # longest time [s] of an answer; USB adapters delay bytes by up to 16 ms
+_MAX_TRIES = 8  # tries before a servo counts as disconnected
 
 
 class Bus:
@@ -25,8 +25,8 @@ class Bus:
 
     def __init__(self, port: Port) -> None:
         self.port = port
-        self.errors: dict[int, int] = {}  # servo -> error bits of its last answer
-        self.repeats = 0  # questions that were asked again
+        self.errors: dict[int, int] = {}  # servo: error bits of its last answer
+        self.repeats = 0  # repeated requests
         self._splitter = Splitter()
 
     def ping(self, servo: int) -> bool:
@@ -52,7 +52,7 @@ class Bus:
         raise LinkError(f"servo {servo} on {self.port.name} does not take {value} for register {register.address}")
 
     def read_all(self, servos: Sequence[int], address: int, size: int) -> dict[int, bytes]:
-        """Contents of the same registers of several servos, asked together; who stays silent is asked again alone."""
+        """Contents of the same registers of several servos in one request; silent servos are asked again alone."""
         answers = self._ask(packet.sync_read(servos, address, size), servos, size, tries=2)
         for servo in servos:
             if servo not in answers:
@@ -60,7 +60,7 @@ class Bus:
         return answers
 
     def write_all(self, address: int, data: Mapping[int, bytes]) -> None:
-        """Write the same registers of several servos at one moment; nobody acknowledges it."""
+        """Write the same registers of several servos at once, without acknowledgement."""
         self.port.write(packet.sync_write(address, data))
 
     def states(self, servos: Sequence[int]) -> dict[int, bytes]:
@@ -82,15 +82,16 @@ class Bus:
         return answers
 
     def _ask(self, question: bytes, servos: Sequence[int], size: int, *, tries: int) -> dict[int, bytes]:
-        """Answers by servo; size: bytes that a whole one has."""
+        """Answers by servo; size: bytes of a complete answer."""
         answers: dict[int, bytes] = {}
         for attempt in range(tries):
             self.repeats += attempt > 0
             self._splitter.clear()
             while self.port.read(0.0):
-                pass  # late answers to an earlier question
+                pass  # discard late answers to an earlier request
             self.port.write(question)
-            end = self.port.now() + (_ANSWER_TIMEOUT + 0.002 * len(servos)) * (1 + attempt // 2)  # computers are late
+            # wait longer in later tries, for a busy computer
+            end = self.port.now() + (_ANSWER_TIMEOUT + 0.002 * len(servos)) * (1 + attempt // 2)
             while len(answers) < len(servos) and self.port.now() < end:
                 for answer in self._splitter.feed(self.port.read(0.002)):
                     self._take_answer(answer, servos, size, answers)

@@ -1,4 +1,4 @@
-"""An arm of STS servos: what of `ServoArm` depends on their registers."""
+"""An arm of STS servos: the methods of `ServoArm` that depend on their registers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["MAX_LAG", "SETTLED_DISTANCE", "ServoMachine", "job", "servo_ids"]
 
 _MAX_COUNTS = 1 << 30  # position [counts] that bounds a servo without limits
-CATCH_UP_FACTOR = 1.5  # factor on the trajectory's speed that a servo may move at to keep up
+CATCH_UP_FACTOR = 1.5  # a servo may move at this multiple of the trajectory's speed to catch up
 
 
 class ServoMachine(ServoArm):
@@ -39,11 +39,11 @@ class ServoMachine(ServoArm):
         return Bus(port)
 
     def _faults(self, number: int) -> list[str]:
-        """What a servo says is wrong with it, by its last answer."""
+        """The faults in a servo's last answer."""
         return registers.error_names(self.bus.errors.get(number, 0))
 
     def _servo_report(self, number: int) -> dict[str, Any]:
-        """What a servo says of itself, by its last state."""
+        """The fields of a servo's last state."""
         state = self._states[number]
         return {
             "load_percent": self._state_value(registers.LOAD, state) / 10,
@@ -52,7 +52,7 @@ class ServoMachine(ServoArm):
         }
 
     def _own_limits(self) -> NDArray[np.int64]:
-        """The servos' own limits, which whoever set them up has written into them: (motors, 2) [counts]."""
+        """The limits that are stored in the servos: (motors, 2) [counts]."""
         limit_bytes = self.bus.read_all(self.ids, *registers.LIMITS)
         pairs = [
             [
@@ -68,7 +68,7 @@ class ServoMachine(ServoArm):
         return register.unpack(raw, registers.LIMITS[0])
 
     def _send(self, counts: NDArray[np.int64], rates: Array) -> None:
-        """Goal positions for all servos at one moment, with the speed that reaches them; 0: as fast as it can."""
+        """Send goal positions to all servos at once, with the speeds to go there; 0: as fast as possible."""
         rows = {}
         for number, count, rate in zip(self.ids, counts.tolist(), rates.tolist(), strict=True):
             speed = 0 if rate == 0.0 else min(int(CATCH_UP_FACTOR * rate) + 20, 32767)

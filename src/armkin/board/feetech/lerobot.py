@@ -1,8 +1,8 @@
-"""A LeRobot calibration file as the zeros, limits and directions of an arm's bus servos.
+"""Reads a LeRobot calibration file: zeros, limits and directions of an arm's bus servos.
 
-LeRobot writes, for each motor by its name, `id`, `drive_mode` (1: the counts run the other way), `homing_offset` (which
-it writes into the servo's register 31, so that reported counts have it in them), and `range_min` and `range_max`, the
-reported counts at the ends of the motion that its owner has made by hand.
+For each motor name LeRobot writes `id`, `drive_mode` (1: inverted counts), `homing_offset` (also in register 31 of
+the servo, so that reported counts include it), and `range_min` and `range_max`, the reported counts at the ends of the
+motion that its owner has made by hand.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _MAX_BYTES = 1_000_000  # size [bytes], at most, of a calibration file
-_MIDDLE_DISTANCE = 5.0  # distance [deg], at most, of a joint's zero from the middle of its limits
+_MIDDLE_DISTANCE = 5.0  # greatest distance [deg] of a joint's zero from the middle of its limits
 _VALUE_RANGES = {
     "id": (0, 253),
     "drive_mode": (0, 1),
@@ -55,7 +55,7 @@ class Motor:
 
 @dataclass(frozen=True)
 class ServoCalibration:
-    """What a calibration file says of an arm."""
+    """The calibration of an arm from a file."""
 
     motors: tuple[Motor, ...]  # motors in the arm's order
     zero: tuple[float, ...]  # [counts] of every drive
@@ -109,7 +109,7 @@ def _whole_number(path: str, name: str, values: Any, key: str) -> int:
 
 
 def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibration:
-    """What a calibration file says of an arm whose joints have a bus servo each.
+    """The calibration of an arm from a file; each of its joints must have a bus servo.
 
     pose: (n,) [rad] where the middles of all ranges are; None: every joint's value is 0 there. Raises FileError for
     what is no calibration file; UsageError, naming the joint, where it does not fit the arm.
@@ -119,23 +119,23 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
     motors, zero, limits = list[Motor](), list[float](), list[tuple[float, float]]()
     edits = Edits()
     for drive, gain in zip(arm.motors, arm.motor_gain, strict=True):
-        j = int(np.flatnonzero(gain)[0])
-        name = arm.joint_names[j]
+        joint = int(np.flatnonzero(gain)[0])
+        name = arm.joint_names[joint]
         motor = _calibrated_motor(calibrated, drive.id, name, path, drive.counts)
         if pose is None:
-            _check_middle(arm, j)
-        per = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
-        zero_count = motor.middle - per * float(middle[j]) / DEGREE
-        low, high = sorted((count - zero_count) / per for count in (motor.range_min, motor.range_max))
+            _check_middle(arm, joint)
+        counts_per_degree = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
+        zero_count = motor.middle - counts_per_degree * float(middle[joint]) / DEGREE
+        low, high = sorted((count - zero_count) / counts_per_degree for count in (motor.range_min, motor.range_max))
         motors.append(motor)
         zero.append(zero_count)
         limits.append((low, high))
-        edits["joints", j, "limits"] = f"[{low:.6f}, {high:.6f}]"
-        edits["joints", j, "drive", "zero"] = _int_if_whole(zero_count)
-        edits["joints", j, "drive", "invert"] = "true" if motor.drive_mode else "false"
-    jaw, ends = _gripper_calibration(arm, calibrated, path, edits)
+        edits["joints", joint, "limits"] = f"[{low:.6f}, {high:.6f}]"
+        edits["joints", joint, "drive", "zero"] = _int_if_whole(zero_count)
+        edits["joints", joint, "drive", "invert"] = "true" if motor.drive_mode else "false"
+    gripper, ends = _gripper_calibration(arm, calibrated, path, edits)
     return ServoCalibration(
-        motors=tuple(motors), zero=tuple(zero), limits=tuple(limits), gripper=jaw, gripper_ends=ends, edits=edits
+        motors=tuple(motors), zero=tuple(zero), limits=tuple(limits), gripper=gripper, gripper_ends=ends, edits=edits
     )
 
 
@@ -148,13 +148,13 @@ def _calibrated_motor(
     motor = motors[number]
     if counts != COUNTS_PER_TURN:
         raise UsageError(f"{path}: joint {name} has {counts} counts a turn; LeRobot's files are for {COUNTS_PER_TURN}")
-    if motor.name != name and name in (listed.name for listed in motors.values()):
+    if motor.name != name and name in (other_motor.name for other_motor in motors.values()):
         raise UsageError(f"{path}: joint {name} is servo {number}, which is {motor.name} in the file")
     return motor
 
 
 def _check_middle(arm: Arm, joint: int) -> None:
-    """Raise UsageError if a joint's zero is not about the middle of its limits, where LeRobot has the arm put."""
+    """Raise UsageError if a joint's zero is far from the middle of its limits, LeRobot's calibration pose."""
     middle = float(arm.lower[joint] + arm.upper[joint]) / 2 / DEGREE
     if not abs(middle) <= _MIDDLE_DISTANCE:
         raise UsageError(
@@ -174,15 +174,15 @@ def _gripper_calibration(
     if drive is None or drive.kind != "bus":
         return None, None
     motor = _calibrated_motor(motors, drive.id, "gripper", path, drive.counts)
-    half = (motor.range_max - motor.middle) / drive.pulses_per_unit()
+    half_range = (motor.range_max - motor.middle) / drive.pulses_per_unit()
     values: Sequence[tuple[str, float | int | str]] = (
         ("zero", _int_if_whole(motor.middle)),
         ("invert", "true" if motor.drive_mode else "false"),
-        ("open", f"{half:.6f}"),
-        ("closed", f"{-half:.6f}"),
+        ("open", f"{half_range:.6f}"),
+        ("closed", f"{-half_range:.6f}"),
     )
     edits.update({("gripper", key): value for key, value in values})
-    return motor, (half, -half)
+    return motor, (half_range, -half_range)
 
 
 def _int_if_whole(count: float) -> int | float:

@@ -3,7 +3,7 @@
     FF FF id length instruction parameters... checksum      from the host
     FF FF id length errors      parameters... checksum      from a servo
 
-Length counts what follows it; the checksum is the complement of the sum from `id` on.
+Length is the number of bytes behind it; the checksum is the complement of the sum from `id` on.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ MAX_BYTES = 250  # size [bytes] of the longest packet that a servo takes
 
 
 class Instruction(IntEnum):
-    """What a servo is asked to do."""
+    """The instructions of the bus."""
 
     PING = 1
     READ = 2
@@ -62,20 +62,20 @@ def sync_read(servos: Sequence[int], address: int, size: int) -> bytes:
 
 
 def sync_write(address: int, values_of: Mapping[int, bytes]) -> bytes:
-    """Write the same registers of several servos at one moment; nobody acknowledges it."""
+    """Write the same registers of several servos at once, without acknowledgement."""
     size = len(next(iter(values_of.values())))
     rows = b"".join(bytes([servo]) + values for servo, values in values_of.items())
     return packet(BROADCAST, Instruction.SYNC_WRITE, bytes([address, size]) + rows)
 
 
 class Splitter:
-    """Packets from bytes as they come; damaged ones are left out."""
+    """Splits received bytes into packets, without damaged ones."""
 
     def __init__(self) -> None:
         self._bytes = bytearray()
 
     def feed(self, received: bytes) -> Iterator[Reply]:
-        """Add bytes and yield every whole packet; of an instruction, `errors` is its number."""
+        """Add bytes and yield every complete packet; `errors` of an instruction is its number."""
         self._bytes += received
         while (begin := self._bytes.find(b"\xff\xff")) >= 0:
             del self._bytes[:begin]
@@ -96,5 +96,5 @@ class Splitter:
         del self._bytes[: max(len(self._bytes) - 1, 0)]
 
     def clear(self) -> None:
-        """Forget what has come and is no whole packet."""
+        """Drop the bytes of an incomplete packet."""
         self._bytes.clear()

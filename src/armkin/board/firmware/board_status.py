@@ -1,4 +1,4 @@
-"""What a board says of itself in words: what `armkin status` tells besides the position, and why a board refused."""
+"""The status of a board as JSON for `armkin status`, and the texts for the errors of a board."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ WHY = {
 
 
 def as_json(info: Info, status: Status, configuration: Configuration) -> dict[str, Any]:
-    """A board's last words as JSON."""
+    """The last status of a board as JSON."""
     flags = Flag(status.flags)
     return {
         "firmware": ".".join(map(str, info.firmware)),

@@ -1,7 +1,7 @@
-"""A robot file as its board must know it: which motor on which axis, limits, rates, home.
+"""Converts a robot file to the configuration of its board: motors on axes, limits, rates, home.
 
-The image (firmware/PROTOCOL.md, section 4) travels to the board once and stays there; its CRC is how host
-and board notice that they mean different arms.
+The image (firmware/PROTOCOL.md, section 4) is sent to the board once and stays there. Host and board compare its CRC to
+detect that they are set up for different arms.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import Gripper
 
-_NO_LIMIT = 2**30  # limit [counts] of an axis without one
-_RATE_FACTOR = 1.05  # factor on a motor's rate: cycles, rates of 15 bits and parabolas make a ramp's end so much faster
+_NO_LIMIT = 2**30  # stands for a missing limit [counts]
+_RATE_FACTOR = 1.05  # margin on a motor's rate for the rounding of cycles, rates and parabolas
 _SERVO_RANGE = (400, 2600)  # pulse lengths [us] that the boards can make
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """An arm on a board."""
+    """The configuration of an arm on a board."""
 
     board: Board
     image: Image
     axes: tuple[int, ...]  # axis of every motor, in the arm's order
-    grip: Grip | None  # None also if the gripper cannot move: it has no max_speed or max_accel
+    grip: Grip | None  # None also for a gripper without max_speed or max_accel
 
     @property
     def steppers(self) -> bool:
@@ -50,8 +50,8 @@ class Configuration:
 def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     """The configuration of an arm.
 
-    rehearsal: for a plan or a simulated board. The robot file's board where it is complete, else one with an
-    axis for every motor. Raises UsageError, naming all that is missing at once: max_speed, `board`, `axis`, ...
+    rehearsal: for a plan or a simulated board; it uses the robot file's board if that is complete, else a made-up one
+    with an axis for every motor. Raises UsageError that lists all missing keys: max_speed, `board`, `axis`, ...
     """
     _refuse_incomplete(arm, board=not rehearsal)
     board, names = _board_and_axes(arm, rehearsal=rehearsal)
@@ -61,18 +61,18 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
     low, high = _count_limits(arm)
     home = pulses(arm, arm.home)
     rate, accel = np.abs(arm.motor_gain) @ arm.max_speed, motor_accel(arm)
-    for k, (motor, axis) in enumerate(zip(arm.motors, axes, strict=True)):
+    for number, (motor, axis) in enumerate(zip(arm.motors, axes, strict=True)):
         if motor.kind == "servo":
-            _check_servo(f"motor {motor.name}", low[k], high[k])
+            _check_servo(f"motor {motor.name}", low[number], high[number])
         stepper = motor.kind == "stepper"
         images[axis] = AxisImage(
             used=True,
-            invert=motor.invert and stepper,  # a servo's is in its counts
-            lower=low[k],
-            upper=high[k],
-            home=int(home[k]),
-            max_rate=_board_rate(board, rate[k]),
-            max_accel=_board_accel(accel[k]),
+            invert=motor.invert and stepper,  # a servo's counts are inverted already
+            lower=low[number],
+            upper=high[number],
+            home=int(home[number]),
+            max_rate=_board_rate(board, rate[number]),
+            max_accel=_board_accel(accel[number]),
         )
     if grip is not None and arm.gripper is not None:
         images[grip.axis] = _grip_image(board, arm.gripper, grip)
@@ -94,7 +94,7 @@ def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:
 
 
 def _board_and_axes(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
-    """The board, and the names of the axes of all motors and of the gripper; made up for a rehearsal without one."""
+    """The board, and the names of the axes of all motors and of the gripper; a rehearsal may make a board up."""
     if rehearsal and missing_keys.without_board(arm):
         return _rehearsal_board(arm), [*(motor.name for motor in arm.motors), "gripper"]
     assert arm.board is not None
@@ -103,7 +103,7 @@ def _board_and_axes(arm: Arm, *, rehearsal: bool) -> tuple[Board, list[str]]:
 
 
 def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
-    """Raise UsageError for an arm that lacks what a board, or a plan, must know, all of it at once."""
+    """Raise UsageError that lists all keys that the board, or a plan, needs and the robot file lacks."""
     if arm.board is None and any(motor.kind == "bus" for motor in arm.motors):
         line = "board: {kind: feetech}"
         raise UsageError(
@@ -122,7 +122,7 @@ def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
 
 
 def _rehearsal_board(arm: Arm) -> Board:
-    """A board that does not exist, with an axis for every motor and a switch for every joint's homing."""
+    """A made-up board with an axis for every motor and a switch for every joint's homing."""
     motors = arm.motors
     steppers = [motor.name for motor in motors if motor.kind == "stepper"]
     servos = [motor.name for motor in motors if motor.kind == "servo"]
@@ -144,12 +144,12 @@ def _rehearsal_board(arm: Arm) -> Board:
 def _count_limits(arm: Arm) -> tuple[list[int], list[int]]:
     """Lowest and highest count of every motor that the joint limits allow."""
     ends: list[list[int]] = [[], []]
-    for k, gain in enumerate(arm.motor_gain):
+    for motor, gain in enumerate(arm.motor_gain):
         for side, sign in enumerate((-1, 1)):
             corner = np.where(gain * sign >= 0, arm.upper, arm.lower)
             corner = np.where(gain == 0, arm.home, corner)
             if np.all(np.isfinite(corner)):
-                ends[side].append(max(-_NO_LIMIT, min(_NO_LIMIT, int(pulses(arm, corner)[k]))))
+                ends[side].append(max(-_NO_LIMIT, min(_NO_LIMIT, int(pulses(arm, corner)[motor]))))
             else:
                 ends[side].append(sign * _NO_LIMIT)
     servo = pulse_range(arm)
@@ -162,69 +162,73 @@ def _limit_rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], h
     """A row for every limited joint that does not have a motor of its own."""
     per_count = np.linalg.pinv(arm.motor_gain)  # (n, motors)
     per_count[np.abs(per_count) < 1e-12 * np.abs(per_count).max()] = 0.0
-    far = np.maximum(np.abs(low), np.abs(high)).astype(float)
+    largest_counts = np.maximum(np.abs(low), np.abs(high)).astype(float)
     rows = []
-    for j in range(arm.n):
-        turning = np.flatnonzero(per_count[j])
-        if len(turning) == 1 and np.count_nonzero(arm.motor_gain[turning[0]]) == 1:
-            continue  # the axis limits say it
-        if not (math.isfinite(arm.lower[j]) or math.isfinite(arm.upper[j])):
+    for joint in range(arm.n):
+        motors = np.flatnonzero(per_count[joint])
+        if len(motors) == 1 and np.count_nonzero(arm.motor_gain[motors[0]]) == 1:
+            continue  # the axis has the limits
+        if not (math.isfinite(arm.lower[joint]) or math.isfinite(arm.upper[joint])):
             continue
-        rows.append(_limit_row(arm, board, axes, per_count[j], j, far))
+        rows.append(_limit_row(arm, board, axes, per_count[joint], joint, largest_counts))
     if len(rows) > board.rows:
         raise UsageError(f"{arm.name} has {len(rows)} coupled joints with limits; {board.kind} takes {board.rows}")
     return tuple(rows)
 
 
-def _limit_row(arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, j: int, widest: Array) -> RowImage:
-    """Scaled to 16-bit weights, the bounds widened by what rounding weights and counts may do."""
-    most = float(np.abs(per_count) @ widest)
-    scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / most)
+def _limit_row(
+    arm: Arm, board: Board, axes: tuple[int, ...], per_count: Array, joint: int, largest_counts: Array
+) -> RowImage:
+    """The row of a joint with 16-bit weights, its bounds widened by the rounding of weights and counts."""
+    largest_sum = float(np.abs(per_count) @ largest_counts)
+    scale = min(32767 / float(np.abs(per_count).max()), (2**30 - 2**20) / largest_sum)
     weight = np.rint(per_count * scale)
-    # The exact sum and the rounded one differ by the weights' rounding times the counts, and the counts
-    # themselves are rounded by up to half, and up to a quarter away where a segment ends.
-    slack = float(np.abs(weight - per_count * scale) @ widest + 0.8 * np.abs(weight).sum())
+    # The rounded sum is off by the weights' rounding times the counts. The counts themselves are rounded by up to a
+    # half, and up to a quarter off at the end of a segment.
+    slack = float(np.abs(weight - per_count * scale) @ largest_counts + 0.8 * np.abs(weight).sum())
     offset = float(weight @ arm.motor_bias)
     bounds = []
-    for limit, sign in ((arm.lower[j], -1), (arm.upper[j], 1)):
-        value = (limit - arm.home[j]) * scale + offset + sign * slack if math.isfinite(limit) else sign * _NO_LIMIT
+    for limit, sign in ((arm.lower[joint], -1), (arm.upper[joint], 1)):
+        value = (limit - arm.home[joint]) * scale + offset + sign * slack if math.isfinite(limit) else sign * _NO_LIMIT
         rounded = math.floor(value) if sign < 0 else math.ceil(value)
         bounds.append(max(-_NO_LIMIT, min(_NO_LIMIT, rounded)))
     weights = [0] * len(board.axes)
-    for axis, w in zip(axes, weight, strict=True):
-        weights[axis] = int(w)
+    for axis, axis_weight in zip(axes, weight, strict=True):
+        weights[axis] = int(axis_weight)
     return RowImage(bounds[0], bounds[1], tuple(weights))
 
 
 def _switch_guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[GuardImage, ...]:
-    """What every switch input of the board guards: the joint that it homes, in the switch's direction."""
+    """The guard of every switch input of the board: it stops the joint that it homes in the switch's direction."""
     guards = [GuardImage() for _ in board.switches]
     per_count = np.linalg.pinv(arm.motor_gain)
-    for j, (homing, guarded) in enumerate(zip(arm.homing, arm.hard_limits, strict=True)):
+    for joint, (homing, guarded) in enumerate(zip(arm.homing, arm.hard_limits, strict=True)):
         if homing is None or not guarded:
             continue
-        toward = per_count[j] * homing.direction
-        toward[np.abs(toward) < 1e-12 * np.abs(toward).max()] = 0.0
+        motor_weights = per_count[joint] * homing.direction
+        motor_weights[np.abs(motor_weights) < 1e-12 * np.abs(motor_weights).max()] = 0.0
         weights = [0] * len(board.axes)
-        for axis, w in zip(axes, _weight_bytes(toward), strict=True):
-            weights[axis] = w
+        for axis, weight in zip(axes, _weight_bytes(motor_weights), strict=True):
+            weights[axis] = weight
         guards[board.switches.index(homing.switch)] = GuardImage(homing.normally == "closed", tuple(weights))
     return tuple(guards)
 
 
 def _weight_bytes(weights: Array) -> list[int]:
     """Weights as signed bytes: exact where they are small whole multiples of the least, else to 1/127."""
-    least = np.abs(weights[weights != 0]).min()
-    scaled = weights / least
+    smallest = np.abs(weights[weights != 0]).min()
+    scaled = weights / smallest
     if np.abs(scaled).max() > 127 or np.abs(scaled - np.rint(scaled)).max() > 1e-9:
         scaled = weights * (127 / np.abs(weights).max())
-    return [int(w) for w in np.rint(scaled)]
+    return [int(value) for value in np.rint(scaled)]
 
 
 def _check_servo(name: str, low: int, high: int) -> None:
-    least, most = _SERVO_RANGE
-    if low < least or high > most:
-        raise UsageError(f"{name}: its limits need pulses of {low} to {high} us; the boards make {least} to {most}")
+    shortest, longest = _SERVO_RANGE
+    if low < shortest or high > longest:
+        raise UsageError(
+            f"{name}: its limits need pulses of {low} to {high} us; the boards make {shortest} to {longest}"
+        )
 
 
 def _board_rate(board: Board, rate: float) -> int:
@@ -255,13 +259,13 @@ def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
 
 
 def _pulse_timing(arm: Arm) -> Driver:
-    """Pulse timing; without steppers, or on a made-up board, any will do."""
+    """The pulse timing of the driver; an arbitrary one without steppers or on a made-up board."""
     name = None if arm.board is None else arm.board.driver
     return Driver(1, 1, 1, 1) if name is None else DRIVERS[name]
 
 
 def _meaning_checksum(arm: Arm, grip: Grip | None) -> int:
-    """Checksum of what counts mean and the limits do not say: the step chains and the home pose."""
+    """A checksum of the step chains and the home pose, which the limits in counts do not show."""
     exact: list[object] = [
         [[f"{value:.12g}" for value in row] for row in arm.motor_gain],
         [f"{value:.12g}" for value in (*arm.motor_bias, *arm.home)],

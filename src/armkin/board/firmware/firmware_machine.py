@@ -1,6 +1,6 @@
-"""An arm on its board: configured, with a known position or a lost one, moved by plans.
+"""An arm on a board with our firmware: configuration, position and motion.
 
-Everything here is said in the arm's words (joints, the robot file); `session` below speaks the protocol's.
+This class works with joints and the robot file; its `session` handles the protocol.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 class FirmwareMachine(Backend):
     """An arm on the board behind an open port.
 
-    `stop` is asked all the time: when it says yes, the arm is held and StoppedError raised.
+    `stop` is called again and again; when it returns True, the arm is held and StoppedError is raised.
     """
 
-    resumable = False  # whether what was held is noted: `armkin.board.firmware.resume_after_hold`
+    resumable = False  # whether a held motion was recorded, see `armkin.board.firmware.resume_after_hold`
 
     def __init__(
         self, port: Port, arm: Arm, configuration: Configuration, stop: Callable[[], bool] = lambda: False
@@ -55,10 +55,10 @@ class FirmwareMachine(Backend):
                 board=board,
                 expected=expected,
             )
-        self.status = self.session.wait_for_rest()  # a former session's motion ends first
+        self.status = self.session.wait_for_rest()  # wait for the motion of an earlier session
         self._simulated = port.simulated
 
-    # Where it stands
+    # Position
 
     @property
     def configured(self) -> bool:
@@ -66,7 +66,7 @@ class FirmwareMachine(Backend):
         return self.info.config == self.configuration.image.crc()
 
     def position(self) -> Position:
-        """Whether the arm's position is known: a board configured for another arm does not know it."""
+        """Whether the arm's position is known; it is lost on a board that is configured for another arm."""
         mask = protocol.mask_of(self.configuration.axes)
         if not self.configured or self.status.known & mask != mask:
             return "lost"
@@ -92,16 +92,16 @@ class FirmwareMachine(Backend):
         return {"configured": self.configured, **as_json(self.info, self.status, self.configuration)}
 
     def refresh(self) -> None:
-        """Read again where the arm stands."""
+        """Read the arm's position again."""
         self.status = self.session.status()
 
     def heard(self) -> None:
-        """Take the newest status that has come while the arm moves."""
+        """Process the newest status that arrived while the arm moves."""
         if self.session.latest is not None:
             self.status = self.session.latest
 
     def hold(self) -> None:
-        """Stop along the path, and stay: also what another session has begun."""
+        """Stop along the path, and stay there, also in a motion of another session."""
         self.status = self.session.hold()
 
     # Getting ready
@@ -109,8 +109,8 @@ class FirmwareMachine(Backend):
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Configure the board, settle the position, switch the motors on.
 
-        assume: (n,) [rad | mm] where an arm whose position is lost stands, on the operator's word. Returns True
-        if it was lost. Raises LinkError if it is lost and nobody vouches for it, or known and assumed.
+        assume: (n,) [rad | mm] joint values of an arm whose position is lost, as the operator states them. Returns True
+        if it was lost. Raises LinkError if it is lost and not assumed, or known and assumed.
         """
         lost = self.position() == "lost"
         if assume is not None and not lost:
@@ -132,7 +132,7 @@ class FirmwareMachine(Backend):
         return lost
 
     def configure(self) -> None:
-        """Write the configuration; all positions are lost with it."""
+        """Write the configuration; the board loses all positions."""
         image = self.configuration.image.pack()
         piece = self.info.frame - 8
         for offset in range(0, len(image), piece):
@@ -141,19 +141,21 @@ class FirmwareMachine(Backend):
         self._renew_info()
 
     def enable(self, axes: Sequence[int]) -> None:
-        """Switch on what these axes need, and what was on or has a position already."""
+        """Switch on drivers or servos for these axes and for all axes with a known position."""
         servos = self.configuration.board.servo_mask
-        need = (protocol.mask_of(axes) | self.status.known) & protocol.mask_of(
+        needed_axes = (protocol.mask_of(axes) | self.status.known) & protocol.mask_of(
             i for i, axis in enumerate(self.configuration.image.axes) if axis.used
         )
         switched_on = self.status.flags & (Flag.DRIVERS | Flag.SERVOS)
-        switches = switched_on | (Flag.DRIVERS if need & ~servos else 0) | (Flag.SERVOS if need & servos else 0)
+        switches = (
+            switched_on | (Flag.DRIVERS if needed_axes & ~servos else 0) | (Flag.SERVOS if needed_axes & servos else 0)
+        )
         if switches != switched_on:
             self._call_board(lambda tag: protocol.enable(tag, int(switches)))
             self._renew_info()
 
     def vouch(self, counts: dict[int, int]) -> None:
-        """Take the operator's word for where lost axes stand: {axis: counts}."""
+        """Set the positions of lost axes as the operator states them: {axis: counts}."""
         missing = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
         if any(self.status.counts[axis] != count for axis, count in counts.items() if axis not in missing):
             raise LinkError(
@@ -165,7 +167,7 @@ class FirmwareMachine(Backend):
             self._renew_info()
 
     def _renew_info(self) -> None:
-        """Read again what configuration, position or power have changed."""
+        """Read the status and update `info` after a change of configuration, position or power."""
         self.status = self.session.status()
         config = self.configuration.image.crc() if self.status.flags & Flag.CONFIGURED else 0
         self.info = protocol.Info(**{**vars(self.info), "config": config, "known": self.status.known})
@@ -173,14 +175,14 @@ class FirmwareMachine(Backend):
     # Moving
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> trajectory_to_counts.Cut:
-        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each, for the board that is there."""
+        """Moves from counts through joint targets (w, n) [rad | mm], stopping at each, for the connected board."""
         info = self.info
         return trajectory_to_counts.plan_moves(
             self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval
         )
 
     def lay(self, trajectory: Trajectory, start: Counts) -> trajectory_to_counts.Cut:
-        """A trajectory that starts at counts (motors,), for the board that is there."""
+        """The plan of a trajectory that starts at counts (motors,), for the connected board."""
         return trajectory_to_counts.cut_trajectory(
             trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval
         )
@@ -188,9 +190,9 @@ class FirmwareMachine(Backend):
     def run(
         self, plans: Iterable[trajectory_to_counts.Cut | None], progress: Progress = lambda elapsed, total: None
     ) -> Status:
-        """Carry out plans, one after another; None in between: nothing to do yet.
+        """Carry out plans in order; a None among them means that the next plan is not there yet.
 
-        Returns the status at the end, where the last plan ends, or raises LinkError.
+        Returns the status at the end of the last plan, or raises LinkError.
         """
         try:
             self.status, end = carry_out(
@@ -212,12 +214,12 @@ class FirmwareMachine(Backend):
         return self.status
 
     def in_time(self) -> None:
-        """Raise LinkError if the board says that ticks came late."""
+        """Raise LinkError if the board reports late ticks."""
         if late := self.status.overruns:
             raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing_text()}")
 
     def run_axis(self, lay: Callable[[int], Move | None], axis: int, clock: int) -> Status:
-        """Carry out the move of a single axis, the gripper, that `lay` makes from counts; None: it is there."""
+        """Carry out the gripper's move, which `lay` makes from its counts; None from `lay`: it has arrived."""
         try:
             self.status = carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
         except DeviceError as error:
@@ -227,11 +229,11 @@ class FirmwareMachine(Backend):
     # Words
 
     def describe(self) -> str:
-        """Where it stands, in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
+        """Joint values in words: ``q1 = 0, q2 = 90, q3 = -90 deg``."""
         return joints_text(self.arm, self.joints())
 
     def standing_text(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
+        """A sentence on where the arm has come to rest, and where the next command starts."""
         if self.position() == "lost":
             return "the arm's position is lost"
         return f"the arm stands at {self.describe()}, its position is known: the next command starts there"

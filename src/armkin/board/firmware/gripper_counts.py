@@ -41,7 +41,7 @@ def as_axis(axis: int, gripper: Gripper) -> Grip:
     else:
         zero = -gripper.open * per_unit  # steps are counted from the open gripper
     top, accel = gripper.max_speed, gripper.max_accel
-    bare = Grip(
+    base = Grip(
         axis=axis,
         open=0,
         closed=0,
@@ -52,10 +52,10 @@ def as_axis(axis: int, gripper: Gripper) -> Grip:
     )
     return Grip(
         axis=axis,
-        open=bare.count(gripper.open),
-        closed=bare.count(gripper.closed),
-        top=bare.top,
-        accel=bare.accel,
+        open=base.count(gripper.open),
+        closed=base.count(gripper.closed),
+        top=base.top,
+        accel=base.accel,
         per_unit=per_unit,
         at_zero=zero,
     )

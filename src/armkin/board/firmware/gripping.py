@@ -1,4 +1,4 @@
-"""The gripper: an axis of its own, opened and closed."""
+"""Moves the gripper, which is an axis of the board."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def gripper_of(name: str, configuration: Configuration) -> Grip:
-    """The arm's gripper; UsageError if it has none, or none that can move."""
+    """The arm's gripper. Raises UsageError if it has none, or one without max_speed or max_accel."""
     gripper = configuration.grip
     if gripper is None:
         raise UsageError(f"{name} has no gripper; add gripper: to its robot file")
@@ -26,7 +26,7 @@ def gripper_of(name: str, configuration: Configuration) -> Grip:
 
 
 def count_of(gripper: Grip, value: str | float) -> int:
-    """Counts of open, closed, or a value of the drive; UsageError if that is beyond the two."""
+    """Counts of open, closed, or a value of the drive. Raises UsageError for a value that is not between them."""
     named = {"open": gripper.open, "closed": gripper.closed}
     if isinstance(value, str):
         return named[value]
@@ -39,12 +39,12 @@ def count_of(gripper: Grip, value: str | float) -> int:
 
 
 def gripper_known(machine: FirmwareMachine, gripper: Grip) -> bool:
-    """Whether the board knows where the gripper stands."""
+    """Whether the board knows the gripper's position."""
     return machine.configured and bool(machine.status.known >> gripper.axis & 1)
 
 
 def prepare_gripper(machine: FirmwareMachine, gripper: Grip, start: int | None) -> None:
-    """Have the gripper's axis configured, known and on; start: counts where a lost one is taken to stand."""
+    """Configure the gripper's axis, set its position and switch it on; start: assumed counts of a lost one."""
     is_known = gripper_known(machine, gripper)
     if is_known and start is not None:
         raise GripperKnownError("the gripper's position is known, and only a lost one may be assumed")
@@ -61,17 +61,17 @@ def prepare_gripper(machine: FirmwareMachine, gripper: Grip, start: int | None) 
 
 
 def move_gripper(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
-    """Move the gripper to counts; where it stands then."""
+    """Move the gripper to counts, and return its counts at the end."""
     assert gripper.top is not None
     assert gripper.accel is not None
     top, accel, board = gripper.top, gripper.accel, machine.configuration.board
 
     def lay(position: int) -> Move | None:
-        far = abs(target - position)
-        clock, least = board.clock, board.min_interval
+        distance = abs(target - position)
+        clock, interval = board.clock, board.min_interval
         return (
-            straight_line([position], [target], top / far, accel / far, clock=clock, min_interval=least)
-            if far
+            straight_line([position], [target], top / distance, accel / distance, clock=clock, min_interval=interval)
+            if distance
             else None
         )
 

@@ -1,7 +1,7 @@
-"""Homing by limit switches: what the robot file says, in the board's counts.
+"""Homing by limit switches (firmware/PROTOCOL.md, section 8).
 
-Each joint moves along its own vector of motors until its switch closes, backs off, and touches the switch
-again slowly; the board latches the counts at that edge. (firmware/PROTOCOL.md, section 8.)
+Each joint moves with all its motors until its switch closes, backs off, and touches the switch again slowly; the board
+latches the counts at that edge.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ if TYPE_CHECKING:
 
 _SLOW_SPEED = 26  # speed of the second approach, in 1/256 of the first: a tenth
 _MAX_COUNTS = 2**30  # greatest number of counts and of counts/s in a command
-_SWITCH_RANGES = 1.25  # distance of a switch, at most, in a joint's ranges
+_SWITCH_RANGES = 1.25  # greatest distance to a switch, in ranges of the joint
 
 
 @dataclass(frozen=True)
 class Search:
-    """One joint's way to its switch, in the protocol's terms."""
+    """The search of one joint for its switch, with the fields of a HOME frame."""
 
     joint: int
     switch: int
     closed: bool
-    backoff: int  # leader's counts
+    backoff: int  # counts of the leading motor
     travel: int
     time: int  # [0.1 s]
     rate: tuple[int, ...]  # per axis of the board
@@ -68,22 +68,22 @@ def searches(
     """
     for name in names:
         joint_index(arm, name)
-    chosen = [j for j, name in enumerate(arm.joint_names) if not names or name in names]
-    chosen = [j for group in _coupled_groups(arm, chosen) for j in group]
-    orders = _homing_orders(arm, chosen, rest_at_home=rest_at_home)
-    in_order = sorted(orders, key=lambda j: (orders[j] is None, orders[j] or 0, j))
-    return [_search_of(arm, configuration, j) for j in in_order]
+    joints = [joint for joint, name in enumerate(arm.joint_names) if not names or name in names]
+    joints = [joint for group in _coupled_groups(arm, joints) for joint in group]
+    orders = _homing_orders(arm, joints, rest_at_home=rest_at_home)
+    ordered = sorted(orders, key=lambda joint: (orders[joint] is None, orders[joint] or 0, joint))
+    return [_search_of(arm, configuration, joint) for joint in ordered]
 
 
 def _homing_orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
-    """Joint -> its order, of joints that have a homing. Raises NoHomingError for others that are not left out."""
-    orders = {j: homing.order for j in joints if (homing := arm.homing[j]) is not None}
-    bare = [arm.joint_names[j] for j in joints if j not in orders]
-    if bare and not (rest_at_home and orders):
+    """{joint: order} of the joints with a homing. Raises NoHomingError for others, unless they rest at home."""
+    orders = {joint: homing.order for joint in joints if (homing := arm.homing[joint]) is not None}
+    without_homing = [arm.joint_names[joint] for joint in joints if joint not in orders]
+    if without_homing and not (rest_at_home and orders):
         raise NoHomingError(
-            f"{arm.path} has no homing for {', '.join(bare)}",
+            f"{arm.path} has no homing for {', '.join(without_homing)}",
             advice="without limit switches put the arm in its home pose, then FirmwareMachine.prepare(assume=arm.home)",
-            joints=bare,
+            joints=without_homing,
             file=arm.path,
             some=bool(orders),
         )
@@ -97,10 +97,10 @@ def home_joints(
     *,
     rest_at_home: bool = False,
 ) -> list[LostSteps]:
-    """Home joints and tell the board where they stand; all positions of theirs are lost until then.
+    """Home joints and set the board's positions; the positions of these joints are lost until then.
 
-    rest_at_home: the joints that have no switch stand in their home pose, says the operator. Counts go on through
-    homing: where they were known before, the result tells how far they were from where the switches are.
+    rest_at_home: the operator states that joints without a switch stand in their home pose. Counts are kept during
+    homing, so the result has the errors of positions that were known before.
     """
     arm = machine.arm
     pending = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
@@ -111,38 +111,40 @@ def home_joints(
     axes = list(machine.configuration.axes)
     lost_before, lost_steps = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
-    turn = {search.joint: i for i, search in enumerate(pending)}
-    for group in sorted(_coupled_groups(arm, list(turn)), key=lambda group: min(turn.get(j, len(turn)) for j in group)):
+    order = {search.joint: i for i, search in enumerate(pending)}
+    for group in sorted(
+        _coupled_groups(arm, list(order)), key=lambda group: min(order.get(j, len(order)) for j in group)
+    ):
         for search in (s for s in pending if s.joint in group):
             announce(arm.joint_names[search.joint])
             status, edge = _run_search(machine, search)
             lost_steps.append(
                 _lost_steps(machine, search, edge, was_known=arm.joint_names[search.joint] not in lost_before)
             )
-            beyond = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
-            q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ beyond
+            overshoot = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
+            q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ overshoot
         motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
         machine.vouch(dict(zip([axes[k] for k in motors], pulses(arm, q)[motors].tolist(), strict=True)))
     if rest_at_home:
-        left = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
-        machine.vouch(dict(zip([axes[k] for k in left], pulses(arm, q)[left].tolist(), strict=True)))
+        lost = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
+        machine.vouch(dict(zip([axes[k] for k in lost], pulses(arm, q)[lost].tolist(), strict=True)))
     return lost_steps
 
 
 def _lost_steps(machine: FirmwareMachine, search: Search, edge: Status, *, was_known: bool) -> LostSteps:
-    """The counts at a switch's edge, against where the robot file says that it is."""
-    arm, j = machine.arm, search.joint
+    """The counts at a switch's edge, compared with its place in the robot file."""
+    arm, joint = machine.arm, search.joint
     if not was_known:
-        return LostSteps(arm.joint_names[j], None, None)
+        return LostSteps(arm.joint_names[joint], None, None)
     counts = [edge.counts[axis] for axis in machine.configuration.axes]
-    gain = arm.motor_gain[:, j]
+    gain = arm.motor_gain[:, joint]
     leader = gain[np.abs(gain).argmax()]
-    steps = round(float((joints(arm, counts)[j] - _switch_value(arm, j)) * leader))
-    return LostSteps(arm.joint_names[j], steps, steps / float(leader))
+    steps = round(float((joints(arm, counts)[joint] - _switch_value(arm, joint)) * leader))
+    return LostSteps(arm.joint_names[joint], steps, steps / float(leader))
 
 
 def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Status]:
-    """Carry out one search; status at rest, and at the switch's edge (page 1)."""
+    """Carry out one search; returns the status at rest, and the one at the switch's edge (page 1)."""
     session = machine.session
     try:
         session.call(search.frame)
@@ -156,17 +158,17 @@ def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Statu
 
 
 def lost_joints(machine: FirmwareMachine) -> list[str]:
-    """Names of the joints that a motor of unknown position turns."""
+    """Names of the joints that are driven by a motor of unknown position."""
     arm, known_axes = machine.arm, machine.status.known if machine.configured else 0
     lost = [not known_axes >> axis & 1 for axis in machine.configuration.axes]
-    moved = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
-    return [name for name, unknown in zip(arm.joint_names, moved, strict=True) if unknown]
+    is_lost = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
+    return [name for name, unknown in zip(arm.joint_names, is_lost, strict=True) if unknown]
 
 
 def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequence[int]], bool]:
-    """The limit inputs' levels of a simulated arm that was switched on in its home pose.
+    """The levels of the limit inputs of a simulated arm that was switched on in its home pose.
 
-    The result takes the number of an input and the net steps of all axes since then.
+    Returns a function of an input's number and the net steps of all axes since then.
     """
     joint_of = {
         configuration.board.switches.index(homing.switch): j
@@ -188,10 +190,10 @@ def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequ
 
 
 def _coupled_groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
-    """Joints that share motors home together: sets of joints, in file order."""
-    left, groups = set(joints), []
-    while left:
-        group = {min(left)}
+    """Groups of joints that share motors and so home together, in file order."""
+    remaining, groups = set(joints), []
+    while remaining:
+        group = {min(remaining)}
         while True:
             motors = np.abs(arm.motor_gain[:, sorted(group)]).sum(axis=1) > 0
             coupled = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
@@ -199,7 +201,7 @@ def _coupled_groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
                 break
             group = coupled
         groups.append(sorted(group))
-        left -= group
+        remaining -= group
     return groups
 
 
@@ -210,15 +212,15 @@ def _switch_value(arm: Arm, joint: int) -> float:
     return float(homing.at * joint_scale(arm)[joint])
 
 
-def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
-    """Joint j's search as the board takes it: rates [counts/s], ways [counts], time [0.1 s].
+def _search_of(arm: Arm, configuration: Configuration, joint: int) -> Search:
+    """The search of a joint: rates [counts/s], distances [counts], time [0.1 s].
 
-    Raises UsageError where the board's whole numbers do not hold them.
+    Raises UsageError for a value out of the range of the board's integers.
     """
-    name, unit, homing = arm.joint_names[j], float(joint_scale(arm)[j]), arm.homing[j]
+    name, unit, homing = arm.joint_names[joint], float(joint_scale(arm)[joint]), arm.homing[joint]
     assert homing is not None
     board = configuration.board
-    gain = arm.motor_gain[:, j]
+    gain = arm.motor_gain[:, joint]
     speed = homing.speed * unit
     rate = [0] * len(board.axes)
     for axis, value in zip(configuration.axes, gain * homing.direction * speed, strict=True):
@@ -232,15 +234,15 @@ def _search_of(arm: Arm, configuration: Configuration, j: int) -> Search:
     backoff = math.ceil(leader * homing.backoff * unit)
     if backoff > _MAX_COUNTS:
         raise UsageError(f"joint {name}: homing.backoff {homing.backoff:g} is {backoff} counts; {_MAX_COUNTS} can be")
-    span = float(arm.upper[j] - arm.lower[j])
+    span = float(arm.upper[joint] - arm.lower[joint])
     if not math.isfinite(span):
-        if arm.prismatic[j]:
+        if arm.prismatic[joint]:
             raise UsageError(f"joint {name} has no limits: homing would not know how far to look")
         span = 2 * math.pi
     travel = math.ceil(leader * (_SWITCH_RANGES * span + homing.backoff * unit))
     seconds = 2 * _SWITCH_RANGES * span / speed + 4 * backoff / (leader * speed * _SLOW_SPEED / 256) + 5
     return Search(
-        joint=j,
+        joint=joint,
         switch=board.switches.index(homing.switch),
         closed=homing.normally == "closed",
         backoff=max(1, backoff),

@@ -1,4 +1,4 @@
-"""One joint at a constant speed: for setting up, also while the position is lost."""
+"""Jogs one joint at a constant speed, which is possible for setting up while the position is lost."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from armkin.motion.plan.trajectory_proof import free_way
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-HANDLE_TIME = 0.25  # time [s] that a board goes on after a JOG, should the next one not come: firmware/PROTOCOL.md
-_MAX_SECONDS = 60.0  # length [s], at most, of a jog that is looked at
-SLOW_DIVISOR = 8  # divisor of max_speed for a lost position: at most an eighth
+HANDLE_TIME = 0.25  # time [s] that a board moves after its last JOG frame, see firmware/PROTOCOL.md
+_MAX_SECONDS = 60.0  # longest jog [s] that is tested for hits
+SLOW_DIVISOR = 8  # divisor of max_speed while the position is lost
 
 
 def prepare_jog(machine: FirmwareMachine) -> None:
-    """Have the motors configured and on; LinkError if the board knows the position of another arm."""
+    """Configure the board and switch the motors on. Raises LinkError if it knows the position of another arm."""
     if machine.session.port.simulated:
         machine.prepare()
         return
@@ -52,7 +52,7 @@ def count_rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int,
     vector = [0.0] * machine.arm.n
     vector[joint] = speed
     exact = machine.arm.motor_gain @ units.joints_in(machine.arm, vector)
-    # Towards zero: rounding must not exceed what the board allows.
+    # Round towards zero, so that no rate exceeds what the board allows.
     rate_of_axis = {axis: int(value) for axis, value in zip(machine.configuration.axes, exact, strict=True)}
     if not any(rate_of_axis.values()):
         raise UsageError(f"SPEED: {speed:g} is less than one count a second")
@@ -60,10 +60,10 @@ def count_rates(machine: FirmwareMachine, joint: int, speed: float) -> dict[int,
 
 
 def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) -> float:
-    """How long a joint's motors may jog at rates (see `count_rates`) so that it stands before it hits anything.
+    """The time [s] that a joint's motors may jog at rates (see `count_rates`) so that the arm stops before a hit.
 
-    Whole counts a second turn the other joints of coupled motors a little, too. Raises NoSolutionError if it could not
-    stand before. inf where nothing is in the way, or nobody knows.
+    Rounded rates move the other joints of coupled motors a little, which is taken into account. inf if nothing is in
+    the way, or the position is lost. Raises NoSolutionError if the arm could not stop before a hit.
     """
     arm = machine.arm
     if not arm.keep_out or machine.position() == "lost":
@@ -74,13 +74,13 @@ def free_seconds(machine: FirmwareMachine, joint: int, rates: dict[int, int]) ->
     rate = float(joint_rates[joint])
     room = max(float((arm.lower, arm.upper)[rate > 0][joint] - q[joint]) / rate, 0.0)
     goal = q + min(room, _MAX_SECONDS) * joint_rates
-    free, why = free_way(arm, q, goal)
-    if why is None:
+    free_share, hit_error = free_way(arm, q, goal)
+    if hit_error is None:
         return math.inf
-    left = free * abs(float(goal[joint] - q[joint])) - rate**2 / (2.0 * float(arm.max_accel[joint]))
-    seconds = left / abs(rate) - HANDLE_TIME
+    distance = free_share * abs(float(goal[joint] - q[joint])) - rate**2 / (2.0 * float(arm.max_accel[joint]))
+    seconds = distance / abs(rate) - HANDLE_TIME
     if seconds <= 0.0:
-        raise NoSolutionError(f"{why.message} (at this speed it would not stand before it)", **why.fields)
+        raise NoSolutionError(f"{hit_error.message} (at this speed it would not stand before it)", **hit_error.fields)
     return seconds
 
 
@@ -89,17 +89,17 @@ def jog_motors(
 ) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
 
-    goes_on: asked every 10 ms; the motion ends when it says no.
+    goes_on: called every 10 ms; the motion ends when it returns False.
     """
     vector = [rate.get(axis, 0) for axis in range(len(machine.configuration.board.axes))]
     port, session = machine.port, machine.session
     begin = port.now()
     try:
-        while (left := seconds - (port.now() - begin)) > 0 and goes_on():
+        while (time_left := seconds - (port.now() - begin)) > 0 and goes_on():
             session.call(lambda tag: protocol.jog(tag, vector))
             if session.state != State.JOGGING:
                 break  # the joint stands at a limit
-            pause = port.now() + min(0.08, left)
+            pause = port.now() + min(0.08, time_left)
             while port.now() < pause and goes_on():
                 session.pump(max(0.001, min(0.01, pause - port.now())))
         session.call(lambda tag: protocol.jog(tag, [0] * len(vector)))

@@ -1,8 +1,8 @@
-"""What a motion ends with when its board resets, stops or refuses: why, where the arm stands, what is lost.
+"""Errors of a motion whose board resets, stops or refuses: the cause, the arm's position, and what is lost.
 
-A reset shows as an answer without a session (`wire/session.py` raises it, `FirmwareMachine.run` asks here): the session
-is opened anew, the board says what it still knows, and nothing of the motion is sent again. Boards with other firmware
-have theirs in `grbl_session.py`, `klipper_machine.py` and `feetech_machine.py`.
+A reset shows as an answer without a session: `wire/session.py` raises an error, and `FirmwareMachine.run` calls this
+module. The session is opened again to read the position, and nothing of the motion is sent again. Boards with
+other firmware have this in `grbl_session.py`, `klipper_machine.py` and `feetech_machine.py`.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Machine(Protocol):
-    """What this module asks of an arm on its board: `firmware_machine.FirmwareMachine` answers it."""
+    """The part of `firmware_machine.FirmwareMachine` that this module uses."""
 
     arm: Arm
     session: Session
@@ -39,22 +39,22 @@ class Machine(Protocol):
         """Known, retained or lost."""
 
     def counts(self) -> tuple[int, ...]:
-        """Counts at which every motor stands, (motors,)."""
+        """Counts of every motor, (motors,)."""
 
     def joints(self) -> Array:
         """Joint values (n,) [rad | mm]."""
 
     def describe(self) -> str:
-        """Where the arm stands, in words."""
+        """The arm's position in words."""
 
     def standing_text(self) -> str:
-        """Where the arm has come to rest, and what that means for the next command."""
+        """A sentence on where the arm has come to rest, and where the next command starts."""
 
 
 def explain_error(machine: Machine, error: DeviceError) -> LinkError:
-    """What the board's error means, and where the arm stands now."""
-    why = WHY.get(error.error)
-    if why is None:
+    """The error for the user: the meaning of the board's error, and the arm's position."""
+    cause = WHY.get(error.error)
+    if cause is None:
         return LinkError(
             f"the board refused what it was sent: {error.error.name} ({error.detail}); it stands still\n"
             "armkin and its firmware disagree: please report it with the robot file"
@@ -65,34 +65,34 @@ def explain_error(machine: Machine, error: DeviceError) -> LinkError:
             machine.info = machine.session.reopen()
             machine.status = machine.session.status()
     except LinkError:
-        return LinkError(f"{why}; then the board did not answer any more: armkin status tells where it stands")
+        return LinkError(f"{cause}; then the board did not answer any more: armkin status tells where it stands")
     if machine.position() == "lost":
-        return position_lost_error(machine, f"{why}\n{machine.standing_text()}")
+        return position_lost_error(machine, f"{cause}\n{machine.standing_text()}")
     return HeldError(
-        f"{why}\nthe arm stands at {machine.describe()}, its position is known",
+        f"{cause}\nthe arm stands at {machine.describe()}, its position is known",
         advice="the next motion starts there",
         joints=joints_out(machine.arm, machine.joints()).tolist(),
     )
 
 
 def must_be_told(machine: Machine) -> PositionLostError:
-    """A motion was asked for while the position is lost."""
+    """The error of a motion while the position is lost."""
     reason = "the arm's position is lost"
     if machine.info.config and not machine.configured:
         changed = f"{machine.arm.path} has changed"
         reason = f"the board is configured for another arm, or {changed}: its position is lost"
-    elif machine.configured and (far := why_impossible(machine.arm, machine.counts())):
-        reason = f"{reason}: {far}"
+    elif machine.configured and (impossible := why_impossible(machine.arm, machine.counts())):
+        reason = f"{reason}: {impossible}"
     return position_lost_error(machine, reason)
 
 
 def position_lost_error(machine: Machine, message: str) -> PositionLostError:
-    """The position is lost, and by what it is found again."""
+    """The error of a lost position, with advice on how to restore it."""
     homing = all(machine.arm.homing)
-    put = "put the arm in its home pose and prepare(assume=arm.home)"
+    home_by_hand = "put the arm in its home pose and prepare(assume=arm.home)"
     return PositionLostError(
         message,
-        advice=f"home it, or {put}" if homing else put,
+        advice=f"home it, or {home_by_hand}" if homing else home_by_hand,
         robot_file=machine.arm.path,
         port=machine.session.port.name,
         homing=homing,

@@ -1,7 +1,7 @@
-"""Resuming a motion after a feed hold: its note, where it stands on its plan, what is left of it.
+"""Resumes a motion after a feed hold: reads its note, finds the arm's place on the plan, and plans the remainder.
 
-The plan is made anew from the same start. The note, a small file beside the port's lock, says which plan that was:
-the robot file's digest, the counts where it began, a digest of the plan; and where the arm came to rest.
+The plan is computed again from the same start. The note is a small file beside the port's lock. It identifies the plan
+by digests of the robot file and the plan and the counts at its beginning, and has the counts where the arm stopped.
 """
 
 from __future__ import annotations
@@ -24,24 +24,24 @@ from armkin.errors import HeldError, LinkError, NothingHeldError
 if TYPE_CHECKING:
     from armkin.board.firmware.firmware_machine import FirmwareMachine
 
-_TIME_ERROR = 1.0  # error [s], at most, of the noted time: of places that near, the earliest is taken
+_TIME_ERROR = 1.0  # greatest error [s] of the noted time; of all places within it, the earliest is taken
 _NOTE_PERIOD = 0.5  # time [s] between two notes while the arm moves
 _MAX_BYTES = 65_536  # size [bytes], at most, of a note
 
 
 @dataclass(frozen=True)
 class Note:
-    """A motion under way, or held."""
+    """A motion that is in progress or held."""
 
     robot: str  # the robot file's SHA-256
     plan: str  # digest of the plan
     start: list[int]  # counts where it began
-    seconds: float  # seconds of the plan that were done, about
-    stands: list[int] | None = None  # counts where it came to rest; None: the sender ended before it was told
+    seconds: float  # seconds of the plan that were done, approximately
+    stands: list[int] | None = None  # counts where it came to rest; None: not reported before the sender ended
 
 
 def plan_digest(parts: Sequence[Cut]) -> str:
-    """A digest of a plan: its ends, its time and its way, to what a board can tell apart."""
+    """A digest of a plan's ends, duration and sampled path, at the resolution of a board."""
     hasher = hashlib.sha256()
     for part in parts:
         q = part.trajectory.q(np.linspace(0.0, part.duration, 33))
@@ -51,7 +51,7 @@ def plan_digest(parts: Sequence[Cut]) -> str:
 
 
 class Trip:
-    """Keeps the note of a motion while it is carried out; of one that has arrived none is kept.
+    """Writes the note of a motion while it is carried out, and deletes it on arrival.
 
     started: the note of the motion that is resumed, and the seconds of it that were done.
     """
@@ -71,7 +71,7 @@ class Trip:
         return self
 
     def progress(self, seconds: float) -> None:
-        """Note that so many seconds of what is left are done."""
+        """Record the seconds done of the remaining motion."""
         elapsed = self._seconds_before + seconds
         if elapsed - self._note.seconds >= _NOTE_PERIOD:
             self._note = replace(self._note, seconds=elapsed)
@@ -97,15 +97,15 @@ class Trip:
 def under_way(
     machine: FirmwareMachine, cuts: Sequence[Cut], note: Note | None
 ) -> Iterator[tuple[Sequence[Cut], int, Callable[[float], None]]]:
-    """The parts to be carried out, the number of the first of them, and whom to tell the seconds done.
+    """The parts to carry out, the number of the first of them, and a function that takes the seconds done.
 
-    note: of the motion that is resumed; None: all of it.
+    note: of the motion that is resumed; None: carry out all parts.
     """
     place = None if note is None else find_place(machine, note, cuts)
-    left = cuts if place is None else remaining_parts(machine, cuts, place)
+    remaining = cuts if place is None else remaining_parts(machine, cuts, place)
     started = None if note is None or place is None else (note, place.elapsed)
     with Trip(machine, cuts, started) as trip:
-        yield left, 0 if place is None else place.part, trip.progress
+        yield remaining, 0 if place is None else place.part, trip.progress
 
 
 def recall_note(machine: FirmwareMachine) -> Note:
@@ -128,7 +128,7 @@ def recall_note(machine: FirmwareMachine) -> Note:
 
 
 def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Place:
-    """Where the arm stands on the plan that was made anew.
+    """The arm's place on the plan, which was computed again.
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
     """
@@ -145,14 +145,14 @@ def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Pl
 
 
 def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place) -> list[Cut]:
-    """What is left of the parts from a place on: the first one from where the arm stands, the others as they are."""
-    left = remaining_trajectory(parts[place.part], place, machine.joints())
+    """The parts from a place on: the first one starts at the arm's position, the others are unchanged."""
+    trajectory = remaining_trajectory(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)
-    return [machine.lay(left, counts), *parts[place.part + 1 :]]
+    return [machine.lay(trajectory, counts), *parts[place.part + 1 :]]
 
 
 def _read_held_note(path: str) -> Note | None:
-    """The note, if there is one that this user wrote."""
+    """The note in a file, or None if it is missing or not valid."""
     fields = read_note(path, _MAX_BYTES)
     if fields is None:
         return None

@@ -1,8 +1,8 @@
-"""Where an arm on GRBL stands.
+"""The position of an arm on GRBL, and whether it can be trusted.
 
-GRBL counts steps from its last reset, and obeys every program. Where the arm stands is kept in a record beside the
-port's lock, with all that GRBL keeps of offsets: it is believed while nothing of that differs. A mark in the volatile
-offset G92, which a reset clears, tells that GRBL was not reset since.
+GRBL counts steps from its last reset, and obeys every program. A record beside the port's lock has the arm's position
+and all offsets of GRBL; the position is trusted while none of these differ. A mark in the volatile offset G92, which a
+reset clears, shows whether GRBL was reset since.
 """
 
 from __future__ import annotations
@@ -24,29 +24,29 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.model.arm import Arm
 
-MARK_OFFSET = 1000  # offset [units] in G92, and at random as much again: no other board has the same, 0 means a reset
+MARK_OFFSET = 1000  # smallest mark [units] in G92; a random part makes it unique, and 0 means a reset
 Kept = dict[str, list[float] | str]
 _LASTING_OFFSETS = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
 
 
 class Place:
-    """Where the arm stands on the GRBL of a session, as last read."""
+    """The arm's position on the GRBL of a session, as last read."""
 
     def __init__(self, session: Session, arm: Arm, axes: Sequence[Axis]) -> None:
         self._session, self._arm, self._axes = session, arm, axes
         self.record = Record(session.port, arm)
-        self.loss_reason = "it was not read"  # the position is lost; empty: it is known
+        self.loss_reason = "it was not read"  # why the position is lost; empty: it is known
         self.offset: NDArray[np.int64] = np.zeros(len(axes), dtype=np.int64)  # machine steps less counts
         self._steps = self.offset
         self._offsets_left: Kept = {}
 
     def counts(self) -> tuple[int, ...]:
-        """Counts of the arm's motors; they mean nothing while the position is lost."""
+        """Counts of the arm's motors, which are meaningless while the position is lost."""
         machine_steps = self._steps if self._session.report is None else self._machine_steps(self._session.report)
         return tuple(int(n) for n in machine_steps - self.offset)
 
     def read(self) -> None:
-        """Read where the arm stands: known if all that GRBL keeps is what armkin left there."""
+        """Read the position, which is known if GRBL's offsets are those that armkin left."""
         status = self._session.sure_status()
         self._session.demand_rest(status)
         if status.position is None:
@@ -56,19 +56,19 @@ class Place:
             letter = self._axes[-1].letter
             raise LinkError(f"GRBL has {len(status.position)} axes; {self._arm.name} needs {letter}, too")
         motion = self._read_offsets()
-        why, left = self.record.differs(self._offsets_left), self.record.note
+        reason, note = self.record.differs(self._offsets_left), self.record.note
         if status.state == "Alarm":
-            why = "GRBL is in an alarm"
-        elif why is None and left is not None:
-            self.offset = np.asarray(left.offset, dtype=np.int64)
+            reason = "GRBL is in an alarm"
+        elif reason is None and note is not None:
+            self.offset = np.asarray(note.offset, dtype=np.int64)
             counts = self.counts()
-            why = self.record.moved_text(counts) or why_impossible(self._arm, counts)
-            if why is None and left.plan is not None and list(counts) != left.counts and motion != "G1":
-                why = "GRBL was reset in a motion, or another program has spoken to it there"
-        self.loss_reason = why or ""
+            reason = self.record.moved_text(counts) or why_impossible(self._arm, counts)
+            if reason is None and note.plan is not None and list(counts) != note.counts and motion != "G1":
+                reason = "GRBL was reset in a motion, or another program has spoken to it there"
+        self.loss_reason = reason or ""
 
     def vouch(self, counts: NDArray[np.int64]) -> None:
-        """Take somebody's word that the motors stand at these counts: set the mark, and record what GRBL keeps."""
+        """Accept the operator's statement of the motors' counts: set the mark, and record GRBL's offsets."""
         self._session.ask("G21G54G49")
         steps = self._machine_steps(self._session.sure_status())
         mark = MARK_OFFSET + random.randrange(MARK_OFFSET)
@@ -86,18 +86,18 @@ class Place:
         self.record.write_position(self._offsets_left, counts.tolist(), self.offset.tolist())
 
     def record_arrival(self) -> None:
-        """Record that the arm rests where it was read."""
+        """Record the position that was read last, at rest."""
         self.record.write_position(self._offsets_left, self.counts(), self.offset.tolist())
 
     def after_reset(self, counts: Sequence[int], reason: str) -> None:
-        """A reset at a standstill has cleared the mark: set it anew, if all that outlives a reset is as it was left.
+        """Set the mark again after a reset at rest, if the offsets that outlive a reset are unchanged.
 
-        reason: the position was lost already.
+        reason: why the position was lost before; empty: it was known.
         """
         if not reason:
             self._read_offsets()
-            left = self.record.note
-            if left is None or any(left.marks.get(name) != self._offsets_left[name] for name in _LASTING_OFFSETS):
+            note = self.record.note
+            if note is None or any(note.marks.get(name) != self._offsets_left[name] for name in _LASTING_OFFSETS):
                 reason = "another program has set an offset while the arm moved"
         if reason:
             self.forget(reason)
@@ -105,16 +105,16 @@ class Place:
             self.vouch(np.asarray(counts, dtype=np.int64))
 
     def forget(self, reason: str) -> None:
-        """Nobody knows where the arm stands."""
+        """Mark the position as lost, and delete the record."""
         self.loss_reason = reason
         self.record.forget()
 
     def _read_offsets(self) -> str:
-        """Read what GRBL keeps that moves targets, of the arm's axes; returns the motion mode in force."""
+        """Read GRBL's offsets for the arm's axes, and return the active motion mode."""
         offsets, words = self._session.stable_offsets()
-        ours = [axis.index for axis in self._axes]
+        indices = [axis.index for axis in self._axes]
         own_offsets: Kept = {
-            name: list(values) if name == "TLO" else [values[k] for k in ours if k < len(values)]
+            name: list(values) if name == "TLO" else [values[k] for k in indices if k < len(values)]
             for name, values in offsets.items()
         }
         systems = (word for word in words if word.partition(".")[0] in _LASTING_OFFSETS)
@@ -123,7 +123,7 @@ class Place:
         return words[0]
 
     def _machine_steps(self, report: Report) -> NDArray[np.int64]:
-        """GRBL's machine position in steps, as it was reported."""
+        """GRBL's machine position in steps, from its report."""
         if report.position is not None:
             values = [report.position[axis.index] * axis.steps for axis in self._axes]
             self._steps = np.rint(values).astype(np.int64)

@@ -1,4 +1,4 @@
-"""An arm on a GRBL board: its settings, its motions, its homing. Where it stands is told by believed_position.py."""
+"""An arm on a GRBL board: settings, motion and homing. `believed_position.py` handles its position."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Trajectory
     from armkin.robot_file.robot_keys import Gripper
 
-_HOLD_TIMEOUT = 30.0  # time [s] that a hold may take
+_HOLD_TIMEOUT = 30.0  # longest time [s] of a hold
 _MAX_SETTINGS_AGE = 5.0  # time [s] after which the settings are read again: jogging prepares three times a second
 
 
@@ -49,11 +49,11 @@ class GrblMachine(StepperArm):
         self.session.open()
         self._place = Place(self.session, arm, self.axes)
         self._record = self._place.record
-        self.settings, self.settings_time = self.session.settings(), port.now()  # the time is that of their reading
+        self.settings, self.settings_time = self.session.settings(), port.now()  # and the time of reading them
         self._spindle = Spindle(self.session)
         self._read()
 
-    # Where it stands
+    # Position
 
     @property
     def loss_reason(self) -> str:
@@ -77,7 +77,7 @@ class GrblMachine(StepperArm):
     # Getting ready
 
     def wrong(self) -> list[settings.Difference]:
-        """Settings that are not as the robot file wants them."""
+        """Settings that differ from the robot file."""
         return settings.differences(self.axes, self.settings, hal=self.session.hal)
 
     def setup(self) -> list[settings.Difference]:
@@ -85,18 +85,18 @@ class GrblMachine(StepperArm):
 
         The position is lost: its steps may mean something else now. Raises LinkError if a setting did not take.
         """
-        before = self.wrong()
-        for difference in before:
+        written = self.wrong()
+        for difference in written:
             self.session.ask(difference.line())
         self.settings = self.session.settings()
-        if before:
+        if written:
             self._place.forget("its settings were written")
-            with suppress(LinkError):  # GRBL may be in an alarm, or gone: forgotten all the same
+            with suppress(LinkError):  # an alarm or a lost connection does not matter here
                 self._reset()
-        left = self.wrong()
-        if left:
-            raise LinkError(f"GRBL did not keep what was written: {left[0]}")
-        return before
+        remaining = self.wrong()
+        if remaining:
+            raise LinkError(f"GRBL did not keep what was written: {remaining[0]}")
+        return written
 
     def _ready(self) -> None:
         """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
@@ -104,15 +104,17 @@ class GrblMachine(StepperArm):
         self.session.demand_rest(report)
         serious = _serious_differences(self)
         if serious:
-            more = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
-            raise LinkError(f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{more}; armkin setup writes them")
+            others = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
+            raise LinkError(
+                f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{others}; armkin setup writes them"
+            )
         if report.state != "Idle":
             raise LinkError(f"GRBL is in state {report.state}, not Idle: home it, or unlock it once you know why")
-        self.session.was_reset = False  # what a reset has taken from it is read now
+        self.session.was_reset = False  # the offsets are read again below
         self._read()
 
     def vouch(self, counts: Sequence[int]) -> None:
-        """Take somebody's word that the motors stand at these counts."""
+        """Accept the operator's statement of the motors' counts."""
         self._place.vouch(np.asarray(counts, dtype=np.int64))
 
     # Moving
@@ -122,15 +124,15 @@ class GrblMachine(StepperArm):
         return trajectory_to_gcode.job(trajectory, start)
 
     def _carry_out(self, job: Job, report: Callable[[float], None]) -> bool:
-        """Send a job's lines and watch the arm on its way; the position at its end is recorded."""
-        began, watch = self.port.now(), Watch(job, self.axes, self._place.offset)
+        """Send a job's lines, watch the arm during the motion, and record the position at its end."""
+        start_time, watch = self.port.now(), Watch(job, self.axes, self._place.offset)
 
         def tick() -> bool:
-            report(self.port.now() - began)
-            watch.heed(self.session.fresh_report(), self.port.now() - began)
+            report(self.port.now() - start_time)
+            watch.heed(self.session.fresh_report(), self.port.now() - start_time)
             return self._stop()
 
-        # the dwell is answered when all before it has been carried out
+        # GRBL answers the dwell after all earlier lines have been carried out
         if not self.session.stream(
             chain(trajectory_to_gcode.gcode_lines(job, self.axes, self._place.offset), ["G4P0.01"]), tick
         ):
@@ -143,7 +145,7 @@ class GrblMachine(StepperArm):
         return True
 
     def _begin(self, job: Job, *, position_read: bool) -> None:
-        """Make sure that the arm stands where a job starts, at its own feed; record the motion."""
+        """Check that the arm is at the start of a job and feeds are not overridden, and record the motion."""
         if not position_read:
             self.session.realtime(replies.PLAIN_FEED)
         super()._begin(job, position_read=position_read)
@@ -151,7 +153,7 @@ class GrblMachine(StepperArm):
             raise LinkError(f"GRBL overrides feeds by {self.session.feed} %, and does not take that back")
 
     def hold(self) -> None:
-        """Stop along the path and clear what is queued; the position stays known."""
+        """Stop along the path and clear the queue; the position stays known."""
         self.session.realtime(replies.HOLD)
         end = self.port.now() + _HOLD_TIMEOUT
         while (status := self.session.status()).state not in ("Idle", "Alarm") and (
@@ -166,7 +168,7 @@ class GrblMachine(StepperArm):
         self._place.after_reset(counts, "GRBL is in an alarm" if alarm else self.loss_reason)
 
     def grip(self, gripper: Gripper, value: float) -> float:
-        """Set the M3 output that the gripper hangs on, and return the S word: GRBL measures nothing."""
+        """Set the M3 output of the gripper, and return the S word, as GRBL measures nothing."""
         try:
             return self._spindle.grip(gripper, value, self.settings)
         except GrblError as error:
@@ -177,7 +179,7 @@ class GrblMachine(StepperArm):
         self._spindle.regrip()
 
     def _explain(self, error: LinkError) -> LinkError:
-        if not isinstance(error, GrblError) or error.error:  # what is queued must not go on by itself
+        if not isinstance(error, GrblError) or error.error:  # stop the queued motion
             try:
                 self.hold()
             except LinkError:
@@ -192,21 +194,21 @@ class GrblMachine(StepperArm):
 
         Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
         """
-        wrong = [
+        serious = [
             difference
             for difference in self.wrong()
             if difference.number in settings.HOMING_SETTINGS and difference.actual is not None
         ]
-        if wrong:
-            raise LinkError(f"GRBL would not home as {self.arm.name} needs: {wrong[0]}; armkin setup writes it")
+        if serious:
+            raise LinkError(f"GRBL would not home as {self.arm.name} needs: {serious[0]}; armkin setup writes it")
         self._place.forget("its homing was interrupted")
         try:
             self.session.ask("$H", patience=180.0)
         except GrblError as error:
             raise self._explain(error) from None
         pull = self.settings.get(27, 0.0)
-        away = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
-        self.vouch(np.rint(np.asarray(counts) - away).tolist())
+        pull_off = [pull * axis.steps * (1 if axis.upward else -1) for axis in self.axes]
+        self.vouch(np.rint(np.asarray(counts) - pull_off).tolist())
 
     def _read(self) -> None:
         self._place.read()

@@ -1,7 +1,7 @@
-"""A conversation with GRBL: lines with their answers, and commands that pass every queue.
+"""A session with GRBL: lines with their answers, and real-time commands that bypass the queue.
 
-Lines are sent ahead as long as they fit GRBL's receive buffer (character counting); every line is answered by
-``ok`` or ``error:N`` in its order. GRBL has no checksum: what a damaged line did shows when the position is read.
+Lines are sent ahead as long as they fit GRBL's receive buffer (character counting), and each is answered in order by
+``ok`` or ``error:N``. GRBL has no checksum, so the effect of a damaged line shows only in the position.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
     from armkin.board.ports import Port
 
 BAUD = 115_200  # rate [bit/s] of the port
-_BOOT_TIMEOUT = 4.0  # time [s] that a board may take to greet after its port was opened
-_ANSWER_TIMEOUT = 2.0  # time [s] that a line may take that moves nothing
-_POLL_PERIOD = 0.1  # time [s] between status requests in motion
-_SILENCE_TIMEOUT = 2.0  # time [s] without an answer while GRBL does not move, a dwell apart: an answer was lost
-_HELD_TIMEOUT = 15.0  # time [s] without an answer while GRBL holds: a button or a damaged byte told it to
-_LATE_ANSWERS = 0.05  # time [s] that answers to another program's lines may come behind
-_NONSENSE_CHARACTERS = ")&"  # characters that are no line, whatever they are the end of
+_BOOT_TIMEOUT = 4.0  # longest time [s] from the opening of the port to the greeting
+_ANSWER_TIMEOUT = 2.0  # longest time [s] of a line without motion
+_POLL_PERIOD = 0.1  # time [s] between two status requests during motion
+_SILENCE_TIMEOUT = 2.0  # time [s] without an answer at rest, besides dwells, after which one was lost
+_HELD_TIMEOUT = 15.0  # the same while GRBL holds, after a button or a damaged byte
+_LATE_ANSWERS = 0.05  # time [s] in which answers to another program's lines may arrive
+_NONSENSE_CHARACTERS = ")&"  # characters that make any unfinished line invalid
 _KEPT_PARAMETERS = "$G", "G54", "G55", "G56", "G57", "G58", "G59", "G92", "TLO"
-_MAX_READINGS = 13  # readings, at most, of an answer until three in a row agree
+_MAX_READINGS = 13  # most readings until three in a row agree
 _UNCLEAR_TEXT = "{port}: what GRBL says differs from reading to reading: is the cable too long, or beside a motor's?"
-_REPORT_TIMEOUT = 0.5  # time [s] that a status report may take
-_MAX_LINE = 4096  # characters, at most, without a line end: no GRBL speaks there
+_REPORT_TIMEOUT = 0.5  # longest time [s] to a status report
+_MAX_LINE = 4096  # more characters without a line end are not from GRBL
 
 
 T = TypeVar("T")
@@ -51,16 +51,16 @@ class Session:
 
     def __init__(self, port: Port) -> None:
         self.port = port
-        self.version, self.hal = "", False  # hal: it is grblHAL
-        self.was_reset = False  # a greeting was heard: all offsets and the position are gone
+        self.version, self.hal = "", False  # hal: whether it is grblHAL
+        self.was_reset = False  # whether a greeting showed a reset, which clears offsets and position
         self.report: Report | None = None
         self._unseen: Report | None = None
-        self.state = ""  # state that GRBL told last
-        self.feed = 100  # [%] of feeds, as last told
+        self.state = ""  # last reported state
+        self.feed = 100  # [%] last reported feed override
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
-        self._sent: deque[tuple[int, str]] = deque()  # lines without an answer: their bytes
-        self._other_lines: list[str] = []  # what came between: settings, offsets, messages
+        self._sent: deque[tuple[int, str]] = deque()  # unanswered lines, with their bytes
+        self._other_lines: list[str] = []  # other lines received: settings, offsets, messages
 
     def open(self) -> None:
         """Wait until GRBL answers a status request. Raises LinkError if it does not, or does not stand still."""
@@ -75,15 +75,15 @@ class Session:
         self.was_reset = False
 
     def wake(self) -> Report:
-        """A first status report. Raises LinkError if none comes."""
+        """The first status report. Raises LinkError if none arrives."""
         end = self.port.now() + _BOOT_TIMEOUT
         while self.port.now() < end:
             self.port.write(replies.STATUS)
-            with suppress(GrblError):  # another program's line may fail, or memory that a new board has not written
+            with suppress(GrblError):  # ignore errors of another program's line, or of a new board's memory
                 self._wait(lambda: self.report is not None, 0.25)
             if self.report is not None:
                 return self.report
-            self.port.write(b")")  # grblHAL hears no `?` in a comment that nobody has ended
+            self.port.write(b")")  # end an open comment, in which grblHAL ignores `?`
             with suppress(GrblError):
                 self._pump(0.01)
         raise LinkError(
@@ -91,7 +91,7 @@ class Session:
         )
 
     def demand_rest(self, report: Report) -> None:
-        """Raise LinkError unless GRBL stands still and takes lines: a motion that goes on is another program's."""
+        """Raise LinkError unless GRBL is at rest and takes lines: a motion now is another program's."""
         if report.state in ("Run", "Jog", "Home"):
             raise LinkError(
                 f"GRBL on {self.port.name} moves (state {report.state}): another program drives it, or the rest of "
@@ -104,18 +104,18 @@ class Session:
             )
 
     def _end_line(self) -> None:
-        """Make an error of what another program may have left of a line: whatever it was, GRBL then does not obey it.
+        """Turn an unfinished line of another program into an error, so that GRBL does not execute it.
 
-        `)` ends a comment, `&` begins no word. A comment from `;` on ends with the line alone, which GRBL then obeys.
+        `)` ends a comment, and `&` is no valid word. A comment after `;` ends with the line, which GRBL then executes.
         """
-        self.realtime(replies.JOG_CANCEL)  # grblHAL drops an open line
+        self.realtime(replies.JOG_CANCEL)  # grblHAL drops an unfinished line
         self._send(_NONSENSE_CHARACTERS)
         try:
             obeyed = self._wait(lambda: not self._sent, _ANSWER_TIMEOUT)
         except GrblError as error:
             if not error.error:
                 raise
-            with suppress(GrblError):  # the first error may have been that of another program's line
+            with suppress(GrblError):  # the first error may belong to another program's line
                 self._wait(lambda: False, _LATE_ANSWERS)
             return
         if not obeyed:
@@ -129,11 +129,11 @@ class Session:
         )
 
     def ask(self, line: str, patience: float = _ANSWER_TIMEOUT) -> list[str]:
-        """Send one line, wait for its ``ok``, and return what came before it."""
+        """Send one line, wait for its ``ok``, and return the lines before it."""
         self._other_lines.clear()
         self._send(line)
         if not self._wait(lambda: not self._sent, patience):
-            self._sent.clear()  # the next line's answer must not be taken for this one's
+            self._sent.clear()  # a late answer must not count for the next line
             raise LinkError(f"GRBL on {self.port.name} did not answer {line!r} within {patience:g} s")
         return list(self._other_lines)
 
@@ -148,17 +148,17 @@ class Session:
         raise LinkError(f"GRBL on {self.port.name} does not answer any more: is the cable plugged in?")
 
     def fresh_report(self) -> Report | None:
-        """A status report that has come since this was asked last."""
+        """A status report that arrived since the last call."""
         report, self._unseen = self._unseen, None
         return report
 
     def sure_status(self) -> Report:
-        """A status report that three in a row agree on: none has a checksum. In motion they cannot: the last one."""
+        """A status report that three in a row agree on, as they have no checksum; during motion the last one."""
         return _agreeing_reading(self.status, self.port.name, lambda report: report.state in ("Run", "Jog", "Home"))
 
     def stable_offsets(self) -> tuple[dict[str, tuple[float, ...]], tuple[str, ...]]:
         """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
-        readings: dict[str, tuple[Any, int]] = {}  # what was read last, and how often in a row
+        readings: dict[str, tuple[Any, int]] = {}  # last value of each name, and how often in a row
         for _ in range(_MAX_READINGS):
             reading: dict[str, Any] = dict(
                 pair for line in self.ask("$#") if (pair := replies.parse_offset(line)) is not None
@@ -177,7 +177,7 @@ class Session:
         return dict(pair for line in self.ask("$$") if (pair := replies.parse_setting(line)) is not None)
 
     def stream(self, work: Iterable[str], tick: Callable[[], bool]) -> bool:
-        """Send lines as fast as GRBL takes them, until all are answered; False if `tick` wanted a stop.
+        """Send lines as fast as GRBL takes them, until all are answered; False if `tick` asked for a stop.
 
         Raises GrblError at the first line that is refused.
         """
@@ -187,30 +187,30 @@ class Session:
             self._send(line)
         return self._drain(0, tick)
 
-    def _drain(self, most: int, tick: Callable[[], bool]) -> bool:
-        """Wait until at most so many bytes have no answer; False if `tick` wanted a stop."""
-        quiet = time_asked = self.port.now()
-        while (waiting := sum(size for size, _ in self._sent)) > most:
+    def _drain(self, max_bytes: int, tick: Callable[[], bool]) -> bool:
+        """Wait until at most `max_bytes` are unanswered; False if `tick` asked for a stop."""
+        last_answer = time_asked = self.port.now()
+        while (waiting := sum(size for size, _ in self._sent)) > max_bytes:
             if tick():
                 return False
             self._not_reset()
-            before, present = self._heard, self.port.now()
-            if present > time_asked + _POLL_PERIOD:
-                time_asked = present
+            answers_before, time = self._heard, self.port.now()
+            if time > time_asked + _POLL_PERIOD:
+                time_asked = time
                 self.port.write(replies.STATUS)
             self._pump(0.01)
-            if self._heard != before:
-                quiet = self.port.now()
+            if self._heard != answers_before:
+                last_answer = self.port.now()
             state = "" if self.report is None else self.report.state
             timeout = _HELD_TIMEOUT if state in ("Hold", "Door") else _SILENCE_TIMEOUT
-            if self.port.now() > quiet + timeout + self._dwell_seconds():
+            if self.port.now() > last_answer + timeout + self._dwell_seconds():
                 state_text = f"GRBL on {self.port.name}, in state {state or '?'},"
                 raise LinkError(f"{state_text} has left {waiting} bytes without an answer")
         self._not_reset()
         return True
 
     def _dwell_seconds(self) -> float:
-        """Seconds that lines without an answer may stand still for."""
+        """The dwell time [s] in unanswered lines."""
         return sum(float(line[3:]) for _, line in self._sent if line.startswith("G4P"))
 
     def _not_reset(self) -> None:
@@ -218,7 +218,7 @@ class Session:
             raise GrblError("GRBL was reset in motion")
 
     def reset(self) -> None:
-        """Soft reset: clears GRBL's queue and its offsets; at a standstill it keeps the machine position."""
+        """Soft reset, which clears GRBL's queue and offsets, and keeps the machine position at rest."""
         self.port.write(replies.RESET)
         self._sent.clear()
         self.report = None
@@ -227,7 +227,7 @@ class Session:
         self.status()
 
     def realtime(self, command: bytes) -> None:
-        """Send a command that passes every queue."""
+        """Send a real-time command, which bypasses the queue."""
         self.port.write(command)
 
     def _send(self, line: str) -> None:
@@ -252,7 +252,7 @@ class Session:
             self._hear(line.strip("\r "))
 
     def _hear(self, line: str) -> None:
-        """Take a line that has come; GrblError for a refusal or an alarm."""
+        """Process a received line. Raises GrblError for a refusal or an alarm."""
         if line == "ok":
             self._heard += 1
             if self._sent:
@@ -280,18 +280,18 @@ class Session:
             self.state = report.state
         self.report = self._unseen = report
         self.feed = self.feed if report.feed is None else report.feed
-        self._heard += report.state in ("Run", "Jog", "Home")  # else it only repeats itself
+        self._heard += report.state in ("Run", "Jog", "Home")  # at rest a report shows no progress
 
 
 def _agreeing_reading(read: Callable[[], T], port: str, accepts: Callable[[T], bool]) -> T:
-    """What three readings in a row agree on, or one that is enough. Raises LinkError if none do.
+    """The value of three equal readings in a row, or one that `accepts` takes. Raises LinkError if none agree.
 
-    Three: two may lose the same digit, as -1000.000 and -1000.000 without one of its first zeros.
+    Three are needed, since two may lose the same digit, for example one of the first zeros of -1000.000.
     """
-    last, same = read(), 1
+    last, equal_count = read(), 1
     for _ in range(_MAX_READINGS):
-        before, last = last, read()
-        same = same + 1 if last and last == before else 1
-        if same == 3 or (accepts(before) and accepts(last)):
+        previous, last = last, read()
+        equal_count = equal_count + 1 if last and last == previous else 1
+        if equal_count == 3 or (accepts(previous) and accepts(last)):
             return last
     raise LinkError(_UNCLEAR_TEXT.format(port=port))

@@ -1,4 +1,4 @@
-"""An arm's motors as GRBL's axes: degrees or mm of what each motor turns, as GRBL's millimetres."""
+"""Assigns an arm's motors to GRBL's axes; a degree or mm of a joint is a millimetre for GRBL."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def axes_of(arm: Arm) -> list[Axis]:
     none of its letters or is used twice, a step too fine for the three decimals of its reports.
     """
     axes: list[Axis] = []
-    for k, motor, name, steps, speed, accel in steppers(arm, "GRBL", LETTERS):
+    for number, motor, name, steps, speed, accel in steppers(arm, "GRBL", LETTERS):
         if steps > COARSE_STEPS:
             raise UsageError(
                 f"{arm.path or arm.name}: motor {name} makes {steps:.4g} steps a unit; GRBL reports positions with "
@@ -36,7 +36,7 @@ def axes_of(arm: Arm) -> list[Axis]:
                 invert=motor.invert,
                 max_speed=speed,
                 max_accel=accel,
-                upward=_is_upward(arm, k),
+                upward=_is_upward(arm, number),
             )
         )
     return axes
@@ -44,6 +44,6 @@ def axes_of(arm: Arm) -> list[Axis]:
 
 def _is_upward(arm: Arm, motor: int) -> bool | None:
     """Whether a motor's counts are greatest at its joint's switch; None: no switch, or it turns several joints."""
-    turned = np.flatnonzero(arm.motor_gain[motor])
-    homing = arm.homing[turned[0]] if len(turned) == 1 else None
-    return None if homing is None else (homing.direction > 0) == bool(arm.motor_gain[motor, turned[0]] > 0)
+    joints = np.flatnonzero(arm.motor_gain[motor])
+    homing = arm.homing[joints[0]] if len(joints) == 1 else None
+    return None if homing is None else (homing.direction > 0) == bool(arm.motor_gain[motor, joints[0]] > 0)

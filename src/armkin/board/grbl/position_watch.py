@@ -1,7 +1,7 @@
-"""Whether GRBL is where its plan is, by its status reports in motion.
+"""Watches GRBL's status reports during a motion for departures from the plan.
 
-A line that was damaged on its way may name another target or another feed, and GRBL obeys. Reports come ten a
-second: two in a row beside the path, or ahead of the plan, end the motion, and so does one that hardly goes on.
+A damaged line may have another target or feed, which GRBL obeys. It reports ten times a second. Two consecutive reports
+off the path or ahead of the plan end the motion, and so does one without progress for a while.
 """
 
 from __future__ import annotations
@@ -23,49 +23,51 @@ if TYPE_CHECKING:
     from armkin.board.grbl.settings import Axis
     from armkin.formula.arrays import Array
 
-PATH_DISTANCE = 2.0  # distance [steps] of a motor from the path: GRBL's own rounding and its reports' is below 1
-LEAD_TIME = 0.3  # time [s] ahead of the plan, at most: GRBL is never faster than it was told
-CREEP_TIMES = 0.1, 3.0  # part [s] of the plan, and time [s] that GRBL takes for it when it no longer moves
-_WINDOW_POINTS = 250  # points of the path that are looked at, 10 s
+PATH_DISTANCE = 2.0  # largest distance [steps] of a motor from the path; rounding is below 1
+LEAD_TIME = 0.3  # longest time [s] ahead of the plan
+CREEP_TIMES = 0.1, 3.0  # progress [s] in the plan, and time [s] for it, below which GRBL has stopped
+_WINDOW_POINTS = 250  # points of the path that are compared, 10 s
 
 
 class Watch:
-    """The path of a job, and how far along it the arm was seen."""
+    """The path of a job, and the arm's progress on it."""
 
     def __init__(self, job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> None:
         self._axes, self._offset = axes, offset
         self._times, self._points = _path_samples(job)
         self._points_passed = 0  # points that the arm has passed
         self._doubts = 0
-        self._plan_time = 0.0  # [s] of the plan that were done
-        self._progress_time = 0.0  # [s] since the start when that was seen
-        self._pause = 0.0  # [s] that the arm may stand there by the plan
+        self._plan_time = 0.0  # [s] progress in the plan
+        self._progress_time = 0.0  # [s] since the start, at that report
+        self._pause = 0.0  # [s] planned pause there
 
     def heed(self, report: Report | None, elapsed: float) -> None:
-        """Raise LinkError if a report, where there is one, tells of a damaged line, or of another program's."""
+        """Raise LinkError if a report, if any, shows a damaged line or another program."""
         if report is not None and report.feed is not None and report.feed > 100:
             raise LinkError(f"another program has set feeds to {report.feed} %")
-        wrong = None if report is None else self.fault(report, elapsed)
-        if wrong:
+        fault = None if report is None else self.fault(report, elapsed)
+        if fault:
             raise LinkError(
-                f"the arm is not where its plan is: {wrong}; a line was damaged on its way, or another program has "
+                f"the arm is not where its plan is: {fault}; a line was damaged on its way, or another program has "
                 "sent one"
             )
 
     def fault(self, report: Report, elapsed: float) -> str | None:
-        """What is wrong with a report that came so many seconds after the start; None while nothing is."""
+        """The fault in a report `elapsed` seconds after the start; None while there is none."""
         if report.position is None or report.state not in ("Run", "Idle"):
             return None
         steps = np.array([report.position[axis.index] * axis.steps for axis in self._axes])
         plan_times = self._plan_times(steps - self._offset)
-        wrong = "it has left its path" if plan_times is None else None
+        fault_text = "it has left its path" if plan_times is None else None
         if plan_times is not None and plan_times[0] > elapsed + LEAD_TIME:
-            wrong = "it is faster than planned"
-        self._doubts = self._doubts + 1 if wrong else 0
-        if self._doubts >= 2:  # a report has no checksum either
-            return wrong
+            fault_text = "it is faster than planned"
+        self._doubts = self._doubts + 1 if fault_text else 0
+        if self._doubts >= 2:  # twice, as reports have no checksum
+            return fault_text
         return (
-            None if wrong or plan_times is None or report.state == "Idle" else self._creep_fault(*plan_times, elapsed)
+            None
+            if fault_text or plan_times is None or report.state == "Idle"
+            else self._creep_fault(*plan_times, elapsed)
         )
 
     def _creep_fault(self, first: float, last: float, elapsed: float) -> str | None:
@@ -75,34 +77,32 @@ class Watch:
         return "it hardly moves on" if elapsed - self._progress_time > CREEP_TIMES[1] + self._pause else None
 
     def _plan_times(self, counts: Array) -> tuple[float, float] | None:
-        """Seconds of the plan when the motors stand at these counts, first and last; None: beside the path."""
+        """First and last time in the plan at which the motors are at these counts; None: off the path."""
         begin = max(self._points_passed - 1, 0)
         points = self._points[begin : begin + _WINDOW_POINTS + 1]
         if len(points) == 1:
             return (0.0, 0.0) if np.abs(counts - points[0]).max() <= PATH_DISTANCE else None
-        way = np.diff(points, axis=0)
-        share = ((counts - points[:-1]) * way).sum(axis=1) / np.maximum((way * way).sum(axis=1), 1e-12)
+        travel = np.diff(points, axis=0)
+        share = ((counts - points[:-1]) * travel).sum(axis=1) / np.maximum((travel * travel).sum(axis=1), 1e-12)
         share = np.clip(share, 0.0, 1.0)
-        near = np.abs(counts - points[:-1] - share[:, None] * way).max(axis=1) <= PATH_DISTANCE
-        if not near.any():
+        on_path = np.abs(counts - points[:-1] - share[:, None] * travel).max(axis=1) <= PATH_DISTANCE
+        if not on_path.any():
             return None
-        first = int(near.argmax())
-        last = first + int(np.argmin(np.append(near[first:], False))) - 1  # the last that follows without a gap
+        first = int(on_path.argmax())
+        last = first + int(np.argmin(np.append(on_path[first:], False))) - 1  # the last one without a gap
         times = self._times[begin:]
         self._points_passed = begin + first
-        ends = [float(times[k] + share[k] * (times[k + 1] - times[k])) for k in (first, last)]
+        ends = [float(times[i] + share[i] * (times[i + 1] - times[i])) for i in (first, last)]
         return ends[0], ends[1]
 
 
 def _path_samples(job: Job) -> tuple[Array, Array]:
-    """Times (T,) [s] and the counts of every motor then (T, motors): the lines that GRBL is sent, in pieces."""
+    """Times (T,) [s] and motor counts (T, motors) along the lines that GRBL is sent."""
     arm = job.trajectory.arm
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
-    for stretch, began in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
+    for stretch, start_time in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE_TIME)), 1) + 1)[1:]
-        sampled = stretch.evaluate(t)
-        times.append(began + t)
-        points.append(
-            exact_pulses(arm, sampled) if isinstance(stretch, Straight) else pulses(arm, sampled).astype(float)
-        )
+        q = stretch.evaluate(t)
+        times.append(start_time + t)
+        points.append(exact_pulses(arm, q) if isinstance(stretch, Straight) else pulses(arm, q).astype(float))
     return np.concatenate(times), np.concatenate(points)

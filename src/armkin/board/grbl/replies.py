@@ -1,7 +1,7 @@
-"""What GRBL 1.1 says, read: status reports, settings, offsets, alarms and errors.
+"""Parses the replies of GRBL 1.1: status reports, settings, offsets, alarms and errors.
 
 Source: the project's public interface description (github.com/gnea/grbl, doc/markdown/interface.md,
-settings.md and the CSV tables of alarms and errors). grblHAL and FluidNC speak the same.
+settings.md and the CSV tables of alarms and errors). grblHAL and FluidNC use the same.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 STATUS, HOLD, RESUME = b"?", b"!", b"~"  # these commands and the next two pass every queue
 RESET, JOG_CANCEL = b"\x18", b"\x85"
-PLAIN_FEED = b"\x90"  # command: feeds as the lines say them, no override
+PLAIN_FEED = b"\x90"  # command: no override of feeds
 LETTERS = "XYZABC"
 RX_BUFFER = 128  # size [bytes] of GRBL's buffer on an Uno; one stays free
 
@@ -42,7 +42,7 @@ ERRORS = {
 }
 LOSES_POSITION = {1, 3, 6, 7, 8, 9}  # alarms after which counted steps mean nothing
 
-_NUMBER = r"-?[0-9]{1,9}(?:\.[0-9]{1,9})?"  # as GRBL prints it; nothing that it measures or keeps is longer
+_NUMBER = r"-?[0-9]{1,9}(?:\.[0-9]{1,9})?"  # a number as GRBL prints it
 
 
 @dataclass(frozen=True)
@@ -143,10 +143,10 @@ def _parse_values(text: str) -> tuple[float, ...]:
 
 
 def alarm_text(number: int) -> str:
-    """What an alarm means."""
+    """The meaning of an alarm."""
     return ALARMS.get(number, f"alarm {number}")
 
 
 def error_text(number: int) -> str:
-    """What an error means."""
+    """The meaning of an error."""
     return ERRORS.get(number, f"error {number}")

@@ -1,4 +1,4 @@
-"""GRBL's settings against the robot file: what must agree before anything moves."""
+"""Compares GRBL's settings with the robot file; serious differences forbid motion."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from armkin.board.grbl.replies import LETTERS
 _INTEGER_SETTINGS = (1, 3, 10, 13, 20, 22, 23, 32, 384)  # settings of whole numbers
 HOMING_SETTINGS = (22, 23)  # settings that only homing needs
 G92_VOLATILE = 384  # setting of grblHAL: 1 clears G92 when the board loses its power
-COARSE_STEPS = 500.0  # resolution [steps a unit] beyond which GRBL's three decimals do not tell every step
+COARSE_STEPS = 500.0  # greatest resolution [steps a unit] at which three decimals show every step
 
 
 @dataclass(frozen=True)
 class Axis:
-    """A motor on one of GRBL's axes, in degrees or mm of what it turns."""
+    """A motor on one of GRBL's axes, in degrees or mm of its joint."""
 
     letter: str
     name: str  # the motor's
@@ -24,7 +24,7 @@ class Axis:
     invert: bool
     max_speed: float  # [units/s]
     max_accel: float  # [units/s2]
-    upward: bool | None = None  # the limit switch is where the motor's counts are greatest; None: it has none
+    upward: bool | None = None  # whether the limit switch is at the greatest counts; None: no switch
 
     @property
     def index(self) -> int:
@@ -34,26 +34,26 @@ class Axis:
 
 @dataclass(frozen=True)
 class Difference:
-    """A setting that is not as the robot file wants it."""
+    """A setting that differs from the robot file."""
 
     number: int
     meaning: str
     actual: float | None
     expected: float
-    serious: bool  # motion would be wrong or too fast; otherwise only slower than planned
+    serious: bool  # whether motion would be wrong or too fast; otherwise it is only slower
 
     def __str__(self) -> str:
-        """For people, and as the line that mends it."""
+        """The difference in words, with the line that corrects it."""
         actual_text = "is not there" if self.actual is None else f"is {self.actual:g}"
         return f"${self.number} ({self.meaning}) {actual_text}: the robot file wants ${self.number}={self.expected:g}"
 
     def line(self) -> str:
-        """The line that mends it; grblHAL takes no 255.000 where it wants a whole number."""
+        """The line that corrects it; grblHAL rejects 255.000 for an integer setting."""
         return f"${self.number}={self.expected:.{0 if self.number in _INTEGER_SETTINGS else 3}f}"
 
 
 def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, tuple[str, float]]:
-    """GRBL's settings for an arm: number -> what it is, value; hal: of grblHAL."""
+    """GRBL's settings for an arm, {number: (meaning, value)}; hal: for grblHAL."""
     expected: dict[int, tuple[str, float]] = {
         1: ("keep the motors on at rest", 255),
         3: ("inverted directions", sum(1 << axis.index for axis in axes if axis.invert)),
@@ -77,26 +77,28 @@ def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, t
 
 
 def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
-    """What is not as the robot file wants it; hal: of grblHAL.
+    """Settings that differ from the robot file; hal: for grblHAL.
 
-    A greatest speed or acceleration below the robot file's is not serious: GRBL is slower than planned, no more.
+    A lower greatest speed or acceleration is not serious, since GRBL is then only slower than planned.
     """
     differing = []
     for number, (meaning, value) in expected_settings(axes, hal=hal or G92_VOLATILE in actual).items():
-        actual_value, bits = actual.get(number), _own_bits(number, axes)
-        if actual_value is not None and bits is not None:
-            value = int(actual_value) & ~bits | int(value) & bits  # the other bits are not ours
+        actual_value, own_bits = actual.get(number), _own_bits(number, axes)
+        if actual_value is not None and own_bits is not None:
+            value = int(actual_value) & ~own_bits | int(value) & own_bits  # other bits belong to other axes
         if actual_value is not None and _is_equal(number, actual_value, value):
             continue
-        slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
+        is_slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
         differing.append(
-            Difference(number, meaning, actual_value, value, serious=not slower and number not in (1, *HOMING_SETTINGS))
+            Difference(
+                number, meaning, actual_value, value, serious=not is_slower and number not in (1, *HOMING_SETTINGS)
+            )
         )
     return differing
 
 
 def _own_bits(number: int, axes: Sequence[Axis]) -> int | None:
-    """The bits of a setting that are armkin's; None: all of it is, or it has none."""
+    """The bits of a setting that belong to the arm; None: the whole value does."""
     if number in (3, 23):
         return sum(1 << axis.index for axis in axes)
     return {10: 3, 22: 1}.get(number)
@@ -104,7 +106,7 @@ def _own_bits(number: int, axes: Sequence[Axis]) -> int | None:
 
 def _is_equal(number: int, actual: float, value: float) -> bool:
     if number == 10:
-        return int(actual) & 1 == 1  # machine position; the buffer is good to know, no more
+        return int(actual) & 1 == 1  # the machine position is needed, the buffer is optional
     return math.isclose(actual, value, rel_tol=0, abs_tol=0.0006)
 
 

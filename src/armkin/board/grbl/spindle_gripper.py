@@ -1,6 +1,6 @@
-"""GRBL's M3 output, on which a gripper hangs: a servo (with the grbl-servo builds), a pump, a magnet.
+"""Drives a gripper by GRBL's M3 output: a servo (with the grbl-servo builds), a pump or a magnet.
 
-GRBL gives out a share S / $30 of its range on one pin and measures nothing.
+GRBL sets one pin to the share S / $30 of its range, and measures nothing.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from armkin.board.grbl.grbl_session import Session
     from armkin.robot_file.robot_keys import Gripper
 
-GRIP_TIME = 0.5  # time [s] that a gripper without max_speed takes
+GRIP_TIME = 0.5  # time [s] of a gripper without max_speed
 
 
 class Spindle:
@@ -24,15 +24,15 @@ class Spindle:
     def __init__(self, session: Session) -> None:
         self._session = session
         answer = (replies.parse_spindle(line) for line in session.ask("$G"))
-        self.value = next((s for s in answer if s is not None), None)  # the S word in force; None: off, or not known
+        self.value = next((s for s in answer if s is not None), None)  # the active S word; None: off, or unknown
 
     def grip(self, gripper: Gripper, value: float, settings: Mapping[int, float]) -> float:
-        """Give out an S word, wait until the gripper has had its time, and return the word.
+        """Set an S word, wait for the gripper, and return the word.
 
-        Raises LinkError, before anything is sent, if GRBL's settings do not let it out.
+        Raises LinkError, before anything is sent, if GRBL's settings do not allow this word.
         """
-        for number, wrong in ((30, settings.get(30, value) < value), (32, settings.get(32, 0.0) != 0)):
-            if wrong:
+        for number, forbids in ((30, settings.get(30, value) < value), (32, settings.get(32, 0.0) != 0)):
+            if forbids:
                 setting_text = f"${number} is {settings[number]:g}"
                 raise LinkError(
                     f"GRBL does not give out S {value:g}: {setting_text} ($30: its greatest S, $32: laser mode)"
@@ -45,7 +45,7 @@ class Spindle:
         return value
 
     def regrip(self) -> None:
-        """After a reset, which switches M3 off: grip what was gripped, unless GRBL is in an alarm."""
+        """Restore the S word after a reset, which switches M3 off, unless GRBL is in an alarm."""
         report = self._session.report
         if self.value is not None and report is not None and report.state != "Alarm":
             self._session.ask(f"M3S{self.value:.3f}")

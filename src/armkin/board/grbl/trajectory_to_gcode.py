@@ -1,4 +1,4 @@
-"""A trajectory as G-code: straight lines in GRBL's machine coordinates, with a feed for the whole joint vector."""
+"""Converts a trajectory to G-code: straight lines in GRBL's machine coordinates, the feed for the joint vector."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 PIECE_TIME = 0.04  # length [s] of a curved stretch in one line: 25 lines a second
-LINE_HEAD = "G21G94"  # words in every line: another program may have left, or set between two, inches or inverse time
-MIN_FEED = 0.01  # feed [units/min], at least: GRBL refuses 0
+LINE_HEAD = "G21G94"  # words in every line, as another program may set inches or inverse time
+MIN_FEED = 0.01  # lowest feed [units/min], as GRBL refuses 0
 
 
 def job(trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
-    """A trajectory from counts `start` (motors,) on, for GRBL, whose own planner may take longer."""
+    """The job of a trajectory from counts `start` (motors,) on; GRBL's own planner may take longer."""
     return Job(trajectory, start, sum(len(_piece_times(stretch)) for stretch in trajectory.stretches))
 
 
 def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> Iterator[str]:
-    """G-code, a line a piece; offset: GRBL's machine steps less the arm's counts."""
+    """The G-code lines, one for each piece; offset: GRBL's machine steps minus the arm's counts."""
     arm, position = job.trajectory.arm, np.asarray(job.start, dtype=np.int64)
     steps = np.array([axis.steps for axis in axes])
     for stretch in job.trajectory.stretches:
-        before = idle = 0.0
+        last_time = idle = 0.0
         for t in _piece_times(stretch):
             goal = np.asarray(pulses(arm, stretch.evaluate(np.array([t]))[0]), dtype=np.int64)
-            way = float(np.linalg.norm((goal - position) / steps))
-            if way > 0.0:
-                speed = way * stretch.law.peak if isinstance(stretch, Straight) else way / (t - before)
+            travel = float(np.linalg.norm((goal - position) / steps))
+            if travel > 0.0:
+                speed = travel * stretch.law.peak if isinstance(stretch, Straight) else travel / (t - last_time)
                 words = "".join(
                     f"{axis.letter}{value:.5f}"
                     for axis, value, moves in zip(axes, (goal + offset) / steps, goal != position, strict=True)
@@ -45,9 +45,9 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
                 )
                 yield f"{LINE_HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
             else:
-                idle += t - before
-            position, before = goal, t
-        if idle > 0.0 and idle == stretch.duration:  # a pause: elsewhere a piece without a step is too short to matter
+                idle += t - last_time
+            position, last_time = goal, t
+        if idle > 0.0 and idle == stretch.duration:  # a pause; single pieces without a step are too short to matter
             yield f"G4P{idle:.3f}"
 
 

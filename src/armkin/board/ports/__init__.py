@@ -1,12 +1,12 @@
-"""Bytes to and from a board.
+"""Ports: bytes to and from a board.
 
-port.py         what every port can do
+port.py         the interface of every port
 scene_note.py   the scene that a port was last used with
 port_lock.py    the lock that keeps two programs from one arm
-port_notes.py   small files beside it
+port_notes.py   small files beside the lock
 logged_port.py  a port whose bytes are logged
 serial_port.py  serial ports
-boot_loader.py  what an opened port may have started
+boot_loader.py  leaving the boot loader that opening a port may start
 socket_port.py  the Unix socket of a program on this computer
 """
 

@@ -1,4 +1,4 @@
-"""A port whose bytes are logged: `armkin.board` at DEBUG. Nobody pays for it who does not listen."""
+"""A port whose bytes are logged by the logger `armkin.board` at DEBUG, and only then."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Traced:
         self.inner.write(data)
 
     def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds."""
+        """The bytes that have arrived, or arrive within `timeout` seconds."""
         received = self.inner.read(timeout)
         if received:
             LOG.debug("%.6f %s < %r", self.inner.now(), self.name, received)
@@ -33,10 +33,10 @@ class Traced:
         return self.inner.now()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self.inner.close()
 
 
 def with_log(port: Port) -> Port:
-    """The port, with its bytes logged where somebody listens."""
+    """The port, with its bytes logged if the logger is at DEBUG."""
     return Traced(port) if LOG.isEnabledFor(logging.DEBUG) else port

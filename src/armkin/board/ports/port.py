@@ -1,4 +1,4 @@
-"""What every port can do: carry bytes both ways and tell the time."""
+"""The interface of every port: bytes in both directions, and a clock."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ SIM = "sim"  # name of a port to a board in this process
 
 
 class Port(Protocol):
-    """Bytes to and from a board, and the clock that its answers are timed with."""
+    """Bytes to and from a board, and the clock for its timeouts."""
 
     name: str
     simulated: bool
@@ -19,10 +19,10 @@ class Port(Protocol):
         """Send bytes."""
 
     def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds; empty if nothing does."""
+        """The bytes that have arrived, or arrive within `timeout` seconds; empty for none."""
 
     def now(self) -> float:
         """Seconds on the clock."""
 
     def close(self) -> None:
-        """Give the port back. The board keeps its position, its motors stay on."""
+        """Close the port; the board keeps its position, and its motors stay on."""

@@ -1,6 +1,6 @@
-"""The right to a port, so that no two programs talk to one arm.
+"""The lock of a port, which keeps two programs from using the same arm.
 
-Who holds it can be found and asked to stop, so that `armkin stop` in another terminal stops the arm.
+The process that holds the lock can be found and asked to stop, so `armkin stop` in another terminal stops the arm.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from armkin.user_folders import port_file_stem
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-_POLL_S = 0.05  # time [s] between two looks at a port's lock
-_signals = os.name == "posix"  # elsewhere a signal of another process ends this one on the spot: a file asks instead
+_POLL_S = 0.05  # time [s] between two checks for a stop request
+_signals = os.name == "posix"  # elsewhere a signal ends a process at once, so a file makes the request
 
 
 class Lock:
-    """The right to a port, held as long as this process lives; a file beside it says which process that is.
+    """The lock of a port, held until release or the end of this process, whose number is in a file beside it.
 
-    rate: the port's, 0 for a socket; it is told by `holder_rate`.
+    rate: the port's baud rate, 0 for a socket, for `holder_rate`.
     """
 
     def __init__(self, name: str, rate: int = 0) -> None:
@@ -44,35 +44,35 @@ class Lock:
         self._lock = lock
         self._pid = _lock_path(name, "pid")
         with suppress(OSError):
-            os.unlink(self._pid)  # whatever stands there, and be it a link to somewhere else
+            os.unlink(self._pid)  # also removes a link to another place
         with suppress(OSError), open(self._pid, "x", encoding="ascii") as file:
             file.write(f"{os.getpid()} {_start_ticks(os.getpid())} {rate}")
         if not _signals:
             self._request = _lock_path(name, "stop")
             with suppress(OSError):
-                os.unlink(self._request)  # the request was meant for who had the port before
+                os.unlink(self._request)  # an old request for the last holder
             threading.Thread(target=self._forward_stop, daemon=True).start()
 
     def _forward_stop(self) -> None:
-        """Raise in this process the signal that others cannot send to it."""
+        """Raise the signal in this process that other processes cannot send to it."""
         while self._lock is not None:
             with suppress(OSError):
                 os.unlink(self._request)
-                heard = signal.getsignal(signal.SIGTERM) not in (signal.SIG_DFL, signal.SIG_IGN)
-                _thread.interrupt_main(signal.SIGTERM if heard else signal.SIGINT)
+                is_handled = signal.getsignal(signal.SIGTERM) not in (signal.SIG_DFL, signal.SIG_IGN)
+                _thread.interrupt_main(signal.SIGTERM if is_handled else signal.SIGINT)
             time.sleep(_POLL_S)
 
     def release(self) -> None:
-        """Let others have the port."""
+        """Release the lock."""
         if self._lock is not None:
             with suppress(OSError):
-                os.unlink(self._pid)  # before the lock goes: no process is taken for the holder afterwards
+                os.unlink(self._pid)  # before the lock, so that no process is mistaken for the holder
             self._lock.release()
             self._lock = None
 
 
 def holder_pid(name: str) -> int | None:
-    """Process that holds a port for armkin; None if none does."""
+    """The process that holds a port for armkin; None: no process does."""
     if "://" in name or name == SIM:
         return None
     try:
@@ -86,32 +86,32 @@ def holder_pid(name: str) -> int | None:
 
 
 def ask_to_stop(name: str, process: int) -> None:
-    """Ask the process that holds a port to stop its arm and to give the port back. Raises OSError."""
+    """Ask the process that holds a port to stop its arm and to close the port. Raises OSError."""
     if sys.platform == "win32" or not _signals:
         with open(_lock_path(name, "stop"), "w", encoding="ascii"):
             return
     os.kill(process, signal.SIGTERM)
-    os.kill(process, signal.SIGCONT)  # a suspended one hears it only when it goes on
+    os.kill(process, signal.SIGCONT)  # a suspended process handles signals only after SIGCONT
 
 
 def holder_rate(name: str) -> int | None:
-    """The rate at which the process that holds a port speaks there; None if nobody says."""
+    """The baud rate of the process that holds a port; None: unknown."""
     words = _pid_file(name)
     return int(words[2]) if len(words) == 3 and words[2].isdigit() else None
 
 
 def note_path(name: str) -> str:
-    """The file beside a port's lock that notes the motion under way."""
+    """The file beside a port's lock with the note of the motion in progress."""
     return _lock_path(name, "motion")
 
 
 def record_path(name: str) -> str:
-    """The file beside a port's lock that records what was last left on the board behind it."""
+    """The file beside a port's lock with the state in which its board was left."""
     return _lock_path(name, "board")
 
 
 def _try_lock(name: str) -> BaseFileLock | None:
-    """The lock of a port, or None if another has it. (flock on POSIX, msvcrt.locking on Windows.)"""
+    """The lock of a port, or None if another process has it (flock on POSIX, msvcrt.locking on Windows)."""
     from filelock import FileLock, Timeout
 
     lock = FileLock(_lock_path(name, "lock"))
@@ -129,13 +129,13 @@ def _lock_path(name: str, end: str) -> str:
 
 
 def _read_pid(name: str) -> int | None:
-    """The process that wrote the file beside a lock, if it still is that process: by its number and its birth."""
+    """The process that wrote the file beside a lock, if it still runs: checked by its number and start time."""
     number, born, _ = (*_pid_file(name), "", "", "")[:3]
     return int(number) if number.isdigit() and born == _start_ticks(int(number)) else None
 
 
 def _pid_file(name: str) -> list[str]:
-    """Words of the file beside a lock: a process, its birth, its rate; [] if there is none."""
+    """Words of the file beside a lock: process, start time, baud rate; [] without a file."""
     try:
         with open(_lock_path(name, "pid"), encoding="ascii") as file:
             return file.read(60).split(" ")
@@ -144,7 +144,7 @@ def _pid_file(name: str) -> list[str]:
 
 
 def _start_ticks(process: int) -> str:
-    """When a process was started, in ticks since this boot (Linux); elsewhere the lock alone is asked."""
+    """The start time of a process in ticks since boot (Linux); empty on other systems."""
     try:
         with open(f"/proc/{process}/stat", "rb") as file:
             return file.read().rpartition(b")")[2].split()[19].decode()  # proc(5): field 22, and 3 follows the name

@@ -1,4 +1,4 @@
-"""Small files beside a port's lock, which outlive the process: a motion under way, what was left on a board."""
+"""Small files beside a port's lock that outlive the process: a motion in progress, the state of a board."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from typing import Any
 
 
 def write_note(path: str, note: Mapping[str, Any]) -> None:
-    """Replace a note as a whole; a full disk costs the note, not the motion."""
+    """Replace a note in one step; errors, such as a full disk, are ignored for the sake of the motion."""
     draft = f"{path}.{os.getpid()}"
     with suppress(OSError):
         remove_note(draft)
         handle = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(handle, "w", encoding="ascii") as file:
             json.dump(note, file)
-        os.replace(draft, path)  # a link of that name is replaced, not followed
+        os.replace(draft, path)  # replaces a link of that name instead of following it
 
 
-def read_note(path: str, most: int) -> dict[str, Any] | None:
-    """The note of at most so many bytes, if there is one that this user wrote."""
+def read_note(path: str, max_bytes: int) -> dict[str, Any] | None:
+    """The note of at most `max_bytes`, if this user wrote it; else None."""
     try:
         handle = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
         with os.fdopen(handle, encoding="ascii") as file:
             if hasattr(os, "getuid") and os.fstat(file.fileno()).st_uid != os.getuid():
                 return None
-            note = json.loads(file.read(most))
+            note = json.loads(file.read(max_bytes))
     except (OSError, ValueError, RecursionError):
         return None
     return note if isinstance(note, dict) else None
 
 
 def remove_note(path: str) -> None:
-    """Forget a note."""
+    """Delete a note."""
     with suppress(OSError):
         os.unlink(path)

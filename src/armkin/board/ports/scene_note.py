@@ -1,4 +1,4 @@
-"""The scene that a port was last used with: a note beside its lock, so that no motion forgets the table."""
+"""A note, beside a port's lock, of the scene that was last used with it, so that no motion omits its keep-outs."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from contextlib import suppress
 
 from armkin.board.ports.port_lock import note_path
 
-_MAX_BYTES = 4096  # length [bytes], at most, of a file's name
+_MAX_BYTES = 4096  # longest file name [bytes]
 
 
 def write_scene(port: str, scene: str) -> None:
-    """Note the scene's file."""
+    """Write the name of the scene's file."""
     path = _scene_note_path(port)
     with suppress(OSError):
-        os.unlink(path)  # whatever stands there, and be it a link to somewhere else
+        os.unlink(path)  # also removes a link to another place
     with open(path, "x", encoding="utf-8") as file:
         file.write(os.path.abspath(scene))
 
 
 def last_scene(port: str) -> str:
-    """The file that was noted last; empty if there is none."""
+    """The name of the last scene's file; empty if there is none."""
     try:
         with open(_scene_note_path(port), encoding="utf-8") as file:
             return file.read(_MAX_BYTES)
@@ -29,7 +29,7 @@ def last_scene(port: str) -> str:
 
 
 def forget_scene(port: str) -> None:
-    """Forget it."""
+    """Delete the note."""
     with suppress(OSError):
         os.unlink(_scene_note_path(port))
 

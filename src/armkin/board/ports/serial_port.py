@@ -21,16 +21,16 @@ from armkin.board.ports.port import BAUD
 from armkin.board.ports.port_lock import Lock
 from armkin.errors import LinkError
 
-_READ_TIMEOUT = 0.005  # time [s] that a read waits at most
-_MAX_READ = 4096  # size [bytes] of one read: what never falls silent must not keep it from the clock and from a stop
+_READ_TIMEOUT = 0.005  # longest wait [s] of a read
+_MAX_READ = 4096  # largest read [bytes], so that a constant stream cannot block a timeout or a stop
 
 
 class SerialPort:
     """A port that pyserial opens.
 
-    reset: an Arduino's reset follows DTR. False leaves it low where the system lets a program choose: Windows, and
-    rfc2217://. Linux and macOS raise it with the first opening after the board was plugged in, whatever a program
-    wants; from then on it is held, and no opening resets.
+    reset: DTR resets an Arduino. False leaves DTR low where a program may choose: on Windows and with rfc2217://. Linux
+    and macOS always raise it at the first opening after the board was plugged in; later it is kept high, so that no
+    opening resets the board.
     """
 
     simulated = False
@@ -49,7 +49,7 @@ class SerialPort:
         self._guard(lambda: self._serial.write(data))
 
     def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds."""
+        """The bytes that have arrived, or arrive within `timeout` seconds."""
         end = time.monotonic() + timeout
         while True:
             received: bytes = self._guard(self._read_some)
@@ -59,10 +59,10 @@ class SerialPort:
     def _read_some(self) -> bytes:
         received: bytes = self._serial.read(1)
         while 0 < len(received) < _MAX_READ and (waiting := self._serial.in_waiting):
-            more: bytes = self._serial.read(min(waiting, _MAX_READ))
-            if not more:
+            chunk: bytes = self._serial.read(min(waiting, _MAX_READ))
+            if not chunk:
                 break
-            received += more
+            received += chunk
         return received
 
     def now(self) -> float:
@@ -70,14 +70,14 @@ class SerialPort:
         return time.monotonic()
 
     def restart(self) -> None:
-        """Reset an Arduino that the opening did not reset; ports without DTR leave that to their opening."""
+        """Reset an Arduino that the opening did not reset; has no effect on ports without DTR."""
         with suppress(Exception):
             self._serial.dtr = self._serial.rts = False
-            time.sleep(0.05)  # the board's capacitor unloads meanwhile
+            time.sleep(0.05)  # the board's capacitor needs this time to discharge
             self._serial.dtr = self._serial.rts = True
 
     def write_at(self, baud: int, data: bytes) -> None:
-        """Send bytes at another rate than the port's, which it has again when they are out."""
+        """Send bytes at another baud rate, and restore the port's own."""
 
         def send() -> None:
             self._serial.baudrate = baud
@@ -88,7 +88,7 @@ class SerialPort:
         self._guard(send)
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         with suppress(Exception):
             self._serial.close()
         self._lock.release()
@@ -106,7 +106,7 @@ class SerialPort:
 
 
 def check_port(name: str) -> None:
-    """Raise LinkError if there is no port of that name; one that is there is not opened, and not reset."""
+    """Raise LinkError if there is no port of that name, without opening or resetting it."""
     import serial
 
     _check_address(name)
@@ -129,7 +129,7 @@ def check_port(name: str) -> None:
 
 
 def _check_address(name: str) -> None:
-    """Raise LinkError for no name at all, and for an address in a network without a host or a port number."""
+    """Raise LinkError for an empty name, and for a network address without host or port number."""
     if not name.strip():
         raise LinkError(
             "the port's name is empty: name a device, socket://HOST:NUMBER, or sim (armkin ports lists them)"
@@ -162,14 +162,14 @@ def _open_serial(name: str, baud: int, reset: bool) -> Any:
         port.open()
     except (serial.SerialException, OSError, ValueError) as error:
         raise LinkError(_cannot_open(name, error)) from None
-    except Exception as error:  # what pyserial makes of a malformed URL: KeyError, re.error, AttributeError, ...
+    except Exception as error:  # pyserial raises KeyError, re.error, AttributeError, ... for a malformed URL
         raise LinkError(_no_url(name, error)) from None
     _keep_dtr(port)
     return port
 
 
 def _keep_dtr(port: Any) -> None:
-    """Do not let closing the port drop DTR: the next opening then does not reset an Uno."""
+    """Keep DTR when the port is closed, so that the next opening does not reset an Uno."""
     if sys.platform == "win32":
         return
     with suppress(Exception):
@@ -186,8 +186,8 @@ def _no_url(name: str, error: Exception) -> str:
 
 def _cannot_open(name: str, error: Exception) -> str:
     reason = _error_reason(error)
-    stated = re.search(r"(?:Errno |\()(\d+)", reason)  # pyserial keeps some numbers in its text alone
-    number = getattr(error, "errno", None) or (int(stated[1]) if stated else None)
+    match = re.search(r"(?:Errno |\()(\d+)", reason)  # some numbers are only in pyserial's text
+    number = getattr(error, "errno", None) or (int(match[1]) if match else None)
     if number == errno.ENOENT or "FileNotFound" in reason:
         ports_text = ", ".join(port.device for port in list_ports())
         return f"there is no port {name}; armkin ports lists them ({ports_text or 'none is plugged in'}), or use sim"
@@ -214,8 +214,8 @@ class Found:
     device: str
     description: str
     hardware: str
-    board: str  # what it looks like, "" if unknown
-    adapter: str = ""  # a chip that other boards and servo buses have, "" if none
+    board: str  # probable board, "" if unknown
+    adapter: str = ""  # chip of other boards and servo buses, "" for none
 
 
 _BOARD_NAMES = {
@@ -244,14 +244,14 @@ _ADAPTER_NAMES = {
 
 
 def list_ports() -> list[Found]:
-    """Serial ports, those that look like an Arduino first."""
+    """The serial ports, probable Arduinos first."""
     from serial.tools import list_ports as tools
 
     ports = []
     for port in tools.comports():
-        looks = _BOARD_NAMES.get((port.vid or 0, port.pid or 0), "")
-        if port.vid is None and looks == "" and port.description in ("n/a", None, port.name):
+        board = _BOARD_NAMES.get((port.vid or 0, port.pid or 0), "")
+        if port.vid is None and board == "" and port.description in ("n/a", None, port.name):
             continue  # a mainboard's empty ttyS
         adapter = _ADAPTER_NAMES.get((port.vid or 0, port.pid or 0), "")
-        ports.append(Found(port.device, port.description or "", port.hwid or "", looks, adapter))
+        ports.append(Found(port.device, port.description or "", port.hwid or "", board, adapter))
     return sorted(ports, key=lambda f: (not f.board, f.device))

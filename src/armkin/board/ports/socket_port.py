@@ -1,4 +1,4 @@
-"""The socket of a program on this computer, as a port: Klipper's API server."""
+"""A Unix socket as a port, for Klipper's API server on this computer."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SocketPort:
             raise LinkError(f"{self.name} is gone ({error}): does Klipper still run?") from None
 
     def read(self, timeout: float) -> bytes:
-        """What has come, or comes within `timeout` seconds."""
+        """The bytes that have arrived, or arrive within `timeout` seconds."""
         try:
             ready, _, _ = select.select([self._socket], [], [], max(timeout, 0.0))
             if not ready:
@@ -63,7 +63,7 @@ class SocketPort:
         return time.monotonic()
 
     def close(self) -> None:
-        """Give the port back."""
+        """Close the port."""
         self._socket.close()
         self._lock.release()
 

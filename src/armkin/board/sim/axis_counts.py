@@ -1,4 +1,4 @@
-"""Counts of the simulated board's axes, and the limit rule that holds for them."""
+"""Counts of the simulated board's axes, and the rule for their limits."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ def row_value(row: RowImage, counts: list[int]) -> int:
 
 
 class Axes:
-    """Where the axes stand, and of which of them the board knows it."""
+    """The counts of the axes, and which of them are known."""
 
     def __init__(self, setup: Setup) -> None:
         self._setup = setup
         self.known = 0
         self.base = [0] * len(setup.board.axes)  # counts at the running segment's start
-        self.net = [0] * len(setup.board.axes)  # steps since power-on: what the arm feels
+        self.net = [0] * len(setup.board.axes)  # steps since power-on: the arm's true motion
 
     @property
     def image(self) -> Image:
-        """The configuration in force."""
+        """The active configuration."""
         return self._setup.image
 
     def settle(self, steps: list[int]) -> None:
-        """Add steps that were made."""
+        """Add completed steps."""
         self.base = [b + m for b, m in zip(self.base, steps, strict=True)]
         self.net = [b + m for b, m in zip(self.net, steps, strict=True)]
 

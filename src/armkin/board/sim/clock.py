@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 
 
 class SimulatedTime(ABC):
-    """What ports to stand-ins of foreign boards share: the clock, and what was answered since the last reading."""
+    """The base class of ports to simulated boards of other makes: the clock, and unread answers."""
 
     step = 0.004  # [s] of simulated time
     simulated = True
@@ -20,7 +20,7 @@ class SimulatedTime(ABC):
         """Let time pass."""
 
     def read(self, timeout: float) -> bytes:
-        """What has been answered; simulated time passes while nothing has."""
+        """The answers since the last call; simulated time passes while there are none."""
         end = self._now + timeout
         while not self._out and self._now < end:
             self.advance(self.step)
@@ -32,5 +32,5 @@ class SimulatedTime(ABC):
         return self._now
 
     def close(self) -> None:
-        """What was not read is gone."""
+        """Do nothing; unread answers are lost."""
         self._out.clear()

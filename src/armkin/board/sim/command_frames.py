@@ -1,4 +1,4 @@
-"""What the simulated board does with the frames of a session: checks first, then setup or motors."""
+"""The simulated board's handling of frames: checks, then actions of setup or motors."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _RUNNING = (State.IDLE, State.MOVING)
 
 
 class Commands:
-    """Frames in sequence; each is carried out, or refused with RefusedError."""
+    """Carries out frames in sequence, or refuses them with RefusedError."""
 
     def __init__(self, setup: Setup, inputs: Inputs, motors: Motors) -> None:
         self._board = setup.board
@@ -79,7 +79,7 @@ class Commands:
             self._motors.axes.known &= ~self._board.servo_mask
 
     def _set_position(self, payload: bytes) -> None:
-        """SET_POSITION: motors whose position is lost stand at these counts."""
+        """SET_POSITION: set the counts of motors whose position is lost."""
         if len(payload) < 4:
             raise RefusedError(Error.LENGTH)
         axes = axes_of(struct.unpack_from("<H", payload, 2)[0])
@@ -129,9 +129,9 @@ class Commands:
 
     def _check_rates(self, rate: Sequence[int], *, jogging: bool) -> None:
         """Raise unless axes may move at these rates without a plan."""
-        moving = [i for i, r in enumerate(rate) if r]
-        slow = jogging and not all(self._axis_known(i) for i in moving)
-        for i in moving:
+        moving_axes = [i for i, r in enumerate(rate) if r]
+        slow = jogging and not all(self._axis_known(i) for i in moving_axes)
+        for i in moving_axes:
             servo = self._setup.servo(i)
             if not self._setup.used(i) or (servo and not jogging):
                 raise RefusedError(Error.VALUE, i)

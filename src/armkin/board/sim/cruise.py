@@ -1,4 +1,4 @@
-"""Homing and jogging move along a vector of rates, of which a share between 0 and 1 is run."""
+"""Motion along a vector of rates, scaled by a share between 0 and 1, for homing and jogging."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ _TICK_TIME = 0.001  # length [s] of a tick
 
 
 class Cruise:
-    """A vector and its share, a step every millisecond; standing when made."""
+    """A vector of rates and its share, updated every millisecond; at rest in the beginning."""
 
     def __init__(self, axes: Axes) -> None:
         self.axes = axes
         self.now = 0.0  # [s] simulated time
-        self.stopped = False  # the motion is to end
+        self.stopped = False  # whether the motion has to end
         self.aim([0] * len(axes.base))
 
     def aim(self, rate: list[int]) -> None:
@@ -24,7 +24,7 @@ class Cruise:
 
     @property
     def slope(self) -> float:
-        """Change of the share in a second that no axis is overtaxed by."""
+        """The greatest change of the share in a second within all accelerations."""
         return min((self.axes.image.axes[i].max_accel / abs(r) for i, r in enumerate(self.rate) if r), default=1e9)
 
     @property
@@ -33,11 +33,11 @@ class Cruise:
         return self.share**2 / (2 * self.slope) * max(abs(r) for r in self.rate)
 
     def velocity(self) -> list[float]:
-        """Every axis's velocity just now."""
+        """The present velocity of every axis."""
         return [r * self.share for r in self.rate]
 
     def glide(self, target: float) -> None:
-        """One millisecond with the share on its way to `target`."""
+        """Move for one millisecond, with the share approaching `target`."""
         before, step = self.share, self.slope * _TICK_TIME
         self.share = min(before + step, target) if target > before else max(before - step, target)
         moved = (before + self.share) / 2 * _TICK_TIME
@@ -48,7 +48,7 @@ class Cruise:
         self.axes.settle(steps)
 
     def clear(self) -> bool:
-        """Whether the arm, were it to brake after the next millisecond, would stay within its limits."""
+        """Whether the arm stays within its limits if it brakes after the next millisecond."""
         image, base, known_axes = self.axes.image, self.axes.base, self.axes.known
         share = min(self.share + self.slope * _TICK_TIME, 1.0)
         ahead = share * _TICK_TIME + share * share / (2 * self.slope) + share * _TICK_TIME

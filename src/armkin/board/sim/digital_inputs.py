@@ -9,7 +9,7 @@ from armkin.board.sim.host_settings import Setup
 
 
 class Inputs:
-    """Levels of the inputs, and what they mean with the configuration in force."""
+    """Levels of the inputs, and their meaning in the active configuration."""
 
     def __init__(self, setup: Setup, switch: Callable[[int], bool] | None = None) -> None:
         self._setup = setup
@@ -30,7 +30,7 @@ class Inputs:
         return bool(self._setup.crc) and self._setup.image.power_sensed and not self.power_level
 
     def switch_ahead(self, rates: Sequence[float]) -> int | None:
-        """The first switch that guards, is pressed, and that these rates lead on into."""
+        """The first pressed guarding switch in the direction of these rates."""
         if not self._setup.crc:
             return None
         for n, guard in enumerate(self._setup.image.guards):
@@ -39,6 +39,6 @@ class Inputs:
         return None
 
     def _released(self, number: int) -> bool:
-        """Level of a switch that nobody presses: low if it is configured as normally closed."""
+        """Level of a released switch: low if it is normally closed."""
         guards = self._setup.image.guards
         return not (self._setup.crc and number < len(guards) and guards[number].closed)

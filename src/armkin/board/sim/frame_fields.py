@@ -1,4 +1,4 @@
-"""What the simulated board reads: batches and images, every field checked, or an error for the session."""
+"""Reads motion frames and configuration images for the simulated board, and checks every field."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from armkin.board_catalogue import Board
 
 
 class RefusedError(Exception):
-    """A frame that is not executed: ends the session."""
+    """Raised for a frame that is not executed; it ends the session."""
 
     def __init__(self, error: Error, detail: int = 0) -> None:
         super().__init__(error.name)
@@ -28,7 +28,7 @@ class MotionFields:
     end: tuple[int, ...]
     segments: list[Segment]
     at_rest: bool
-    brake: float  # share of the accelerations that a hold takes
+    brake: float  # share of the accelerations that a hold uses
 
 
 def read_batch(payload: bytes) -> MotionFields:
@@ -56,7 +56,7 @@ def axes_of(mask: int) -> list[int]:
     return [i for i in range(16) if mask >> i & 1]
 
 
-_MAX_COUNTS = 2**30  # number [counts], at most, in a field
+_MAX_COUNTS = 2**30  # greatest number [counts] in a field
 
 
 def image_valid(image: Image, board: Board) -> bool:
@@ -79,7 +79,7 @@ def _weights_valid(weights: Sequence[int], axes: Sequence[AxisImage]) -> bool:
 
 
 def _row_valid(row: RowImage, axes: Sequence[AxisImage]) -> bool:
-    """Whether a coupled limit has its bounds in order, and its sum fits the board's numbers."""
+    """Whether the bounds of a coupled limit are in order, and its sum fits the board's integers."""
     reach = zip(row.weight, axes, strict=True)
     most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
     return row.lower <= row.upper and most < _MAX_COUNTS

@@ -1,4 +1,4 @@
-"""What the host has set up on the simulated board: its configuration, and what is switched on."""
+"""The simulated board's setup by the host: its configuration, drivers and servo pulses."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from armkin.board_catalogue import Board
 
 
 class Setup:
-    """The configuration in force, the bytes of the next one, drivers and servo pulses."""
+    """The active configuration, the bytes of the next one, drivers and servo pulses."""
 
     def __init__(self, board: Board) -> None:
         self.board = board
         self.reset()
 
     def reset(self) -> None:
-        """Forget everything."""
+        """Reset to a board without a configuration."""
         board, n = self.board, len(self.board.axes)
         self._bytes = bytearray(12 + 21 * n + (1 + n) * len(board.switches) + (8 + 2 * n) * board.rows)
         self.image = Image(tuple(AxisImage() for _ in board.axes))
@@ -26,7 +26,7 @@ class Setup:
         self.retained = False  # over a reset
 
     def retain(self, image: bytes, drivers: bool) -> None:
-        """Take over what stood before a reset; `image` is empty if there was no configuration."""
+        """Restore the state before a reset; `image` is empty without a configuration."""
         if image:
             self._bytes[: len(image)] = image
             self.image = Image.unpack(image, len(self.board.switches)) or self.image
@@ -38,7 +38,7 @@ class Setup:
         return self.image.pack() if self.crc else b""
 
     def write(self, offset: int, piece: bytes) -> None:
-        """Write bytes of the next configuration: from now on there is none, and everything is off."""
+        """Write bytes of the next configuration, which deactivates the old one and switches all off."""
         if offset + len(piece) > len(self._bytes):
             raise RefusedError(Error.VALUE)
         self._bytes[offset : offset + len(piece)] = piece
@@ -46,7 +46,7 @@ class Setup:
         self.drivers = self.pulses = self.retained = False
 
     def commit(self, length: int, crc: int) -> None:
-        """Put the bytes in force, if every field of theirs is in its range."""
+        """Activate the written configuration if all its fields are in range."""
         raw = bytes(self._bytes[:length])
         image = Image.unpack(raw, len(self.board.switches))
         if image is None or len(raw) != length or zlib.crc32(raw) != crc or not image_valid(image, self.board):

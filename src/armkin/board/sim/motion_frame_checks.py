@@ -1,4 +1,4 @@
-"""What the simulated board checks of a MOTION frame before it queues a segment of it (firmware/PROTOCOL.md, 6)."""
+"""The simulated board's checks of a MOTION frame before it queues any segment (firmware/PROTOCOL.md, 6)."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from armkin.board.sim.segment_queue import Queue
 
 
 class Batches:
-    """The batches of one motion: speeds at the plan's end, and the nearest that coupled joints were to their limits."""
+    """The batches of one motion: speeds at the plan's end, and least distances of coupled joints from their limits."""
 
     def __init__(self, setup: Setup, queue: Queue) -> None:
         self._setup, self._queue = setup, queue
         self.begin()
 
     def begin(self) -> None:
-        """A motion begins, at rest where the queue ends."""
+        """Begin a motion at rest at the end of the queue."""
         self._velocity = Velocity(self._setup.board, self._setup.image)
         self._rows = Rows(self._setup.image, self._queue.plan_counts())
 

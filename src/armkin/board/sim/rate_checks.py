@@ -1,4 +1,4 @@
-"""What the simulated board thinks of speeds: RATE and ACCEL of firmware/PROTOCOL.md, section 6, in its integers."""
+"""The simulated board's checks of RATE and ACCEL in integers (firmware/PROTOCOL.md, section 6)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from armkin.board.sim.frame_fields import RefusedError
 from armkin.board_catalogue import Board
 
 _MAX_UINT16 = 0xFFFF
-_MAX_CHANGE = 1 << 23  # change in a window, from which on an acceleration is not checked
+_MAX_CHANGE = 1 << 23  # budget of a window from which on the acceleration is not checked
 
 
 def times_valid(s: Segment, least: int) -> bool:
@@ -28,7 +28,7 @@ def times_valid(s: Segment, least: int) -> bool:
 
 
 class Pace(NamedTuple):
-    """What is the same for all axes of a segment; all 0: rest, which is as long as the segment beside it."""
+    """The timing of a segment, common to all axes; all 0: a rest as long as the segment beside it."""
 
     first: int = 0  # reciprocal of the interval
     last: int = 0
@@ -47,7 +47,7 @@ def _quarter_velocity(start: int, end: int, windows: int) -> int:
 
 
 class Velocity:
-    """Every axis's velocities in the plan's last segment, and what it took beyond its budget; at rest when made."""
+    """Every axis's velocities in the plan's last segment, and its use beyond the budget; at rest in the beginning."""
 
     def __init__(self, board: Board, image: Image) -> None:
         self.board, self.image = board, image
@@ -64,7 +64,7 @@ class Velocity:
         return twin
 
     def begin(self, s: Segment) -> None:
-        """Take up a segment, whose intervals have been checked."""
+        """Begin a segment whose intervals have been checked."""
         part = self.board.clock // 20
         cycles, time, windows = s.ticks * ((s.interval + s.last_interval) >> 1), _MAX_UINT16, 0
         if cycles < part:
@@ -95,7 +95,7 @@ class Velocity:
         return float((1 << 15 + self._bits) / self.board.clock)
 
     def _budget(self, axis: int, time: int) -> int:
-        """What 5/4 of max_accel makes in a time; _MAX_CHANGE: it is not checked."""
+        """The velocity change of 5/4 max_accel in a time; _MAX_CHANGE: not checked."""
         step = min(int(self.image.axes[axis].max_accel * 5 / 4 * 0.05 / 256 * self._time_unit), _MAX_CHANGE - 1) + 1
         low, high = step & _MAX_UINT16, step >> 16
         return (low * time >> 8) + (high * time << 8) if step < _MAX_CHANGE else _MAX_CHANGE << 16

@@ -11,8 +11,8 @@ from itertools import accumulate
 from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
 from armkin.board.sim.axis_counts import Axes
 
-_TOO_FAST = 0.030  # time [s] to a stop from which an abrupt stop loses steps
-_SLOW_STOP = 0.024  # time [s] to a stop below which the arm may stand where its queue ends
+_TOO_FAST = 0.030  # shortest time [s] to a stop at which an abrupt stop loses steps
+_SLOW_STOP = 0.024  # longest time [s] to a stop at which the arm may stop at the queue's end
 
 
 def intervals(s: Segment) -> Iterator[int]:
@@ -41,7 +41,7 @@ class QueuedSegment:
 
 
 class Queue:
-    """Segments that run one after the other, and how far the first has come."""
+    """The queued segments, and the progress of the first one."""
 
     def __init__(self, axes: Axes, clock: int, slots: int) -> None:
         self.axes, self.clock, self.slots = axes, clock, slots
@@ -99,7 +99,7 @@ class Queue:
         return [float(r) for r in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.axes.base)
 
     def run(self, seconds: float) -> QueuedSegment | None:
-        """Let time pass; the last segment, if its end has been passed. Axes stopped too abruptly are lost."""
+        """Let time pass; returns the last segment if it has ended. Axes that stop too abruptly lose their position."""
         self._cycles_run += seconds * self.clock
         while self._queue and self._cycles_run >= self._queue[0].times[-1]:
             speed = self.stop_time()
@@ -131,7 +131,7 @@ class Queue:
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
     def dry(self, u: float, *, holding: bool = False) -> bool:
-        """Whether what is left is just enough for a stop that takes u seconds, and does not end at rest."""
+        """Whether the queue is just long enough for a stop of u seconds and does not end at rest."""
         if not self._queue or self._queue[-1].end or (u < _SLOW_STOP and not holding):
             return False
         cycles_left = self._units * 256 - self._cycles_run

@@ -24,7 +24,7 @@ _SILENCE_TIMEOUT = 0.5  # time [s] of silence after which the board holds
 
 @dataclass(frozen=True)
 class _RetainedState:
-    """What a reset leaves of an arm that stood still."""
+    """The state of an arm at rest that survives a reset."""
 
     image: bytes  # image of the configuration, empty if there was none
     drivers: bool
@@ -78,7 +78,7 @@ class SimBoard:
             self.motors.advance(step)
 
     def reset(self, power: bool = False) -> None:
-        """An external reset, or the plug pulled: what stood still is retained, what moved is lost."""
+        """Reset the board, or cut its power; positions survive a reset at rest and are lost in motion."""
         motors, setup = self.motors, self.setup
         still = motors.state == State.IDLE
         motors.cut()
@@ -106,7 +106,7 @@ class SimBoard:
         self._commands = Commands(self.setup, self.inputs, self.motors)
 
     def _watch(self) -> None:
-        """End the session if an input says so."""
+        """End the session if an input demands it."""
         if self.inputs.aborted():
             self._end_session(Error.ABORT)
         if self.inputs.power_cut():
@@ -117,7 +117,7 @@ class SimBoard:
                 self._end_session(Error.LIMIT_SWITCH, switch)
 
     def _end_session(self, error: Error, detail: int = 0) -> None:
-        """End the session; the first cause stays."""
+        """End the session; its first error is kept."""
         if not self._error:
             self._error, self._detail = error, detail
         self.motors.stop(wholly=error == Error.LIMIT_SWITCH)

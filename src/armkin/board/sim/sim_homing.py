@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from armkin.board.firmware.wire.protocol import Error
 from armkin.board.sim.cruise import Cruise
 
-_DEBOUNCE_TIME = 0.004  # time [s] that a switch must be closed
+_DEBOUNCE_TIME = 0.004  # time [s] for which a switch must be closed
 
 
 @dataclass(frozen=True)
@@ -31,18 +31,18 @@ class Homing:
         self._cruise, self._level, self._fault = cruise, level, fault
         self.latch = [0] * len(cruise.axes.base)  # counts at the edge
         self.latched = False  # a search has finished
-        self._switch_time = -1.0  # [s] when the switch took the level waited for; -1: it has not
+        self._switch_time = -1.0  # [s] when the switch reached the expected level; -1: not yet
         self._switch_counts: list[int] = []  # counts at that time
-        self._beyond = 0  # counts past the edge that the first approach came to rest at
+        self._beyond = 0  # counts past the edge at the rest after the first approach
 
     def run(self, search: Search) -> Iterator[None]:
-        """Look for a switch, a step a millisecond."""
+        """Search for a switch; each item is a millisecond."""
         self.latched = False
         self._until = self._cruise.now + search.time
         return self._phases(search)
 
     def _phases(self, s: Search) -> Iterator[None]:
-        """Off the switch, fast to its edge, back, slowly to its edge."""
+        """Leave the switch, find its edge fast, back off, find it slowly."""
         back = [-r for r in s.rate]
         if self._is_pressed(s) and not (
             yield from self._find_edge(s, back, s.slow, False, 2 * s.backoff, Error.SWITCH)
@@ -60,14 +60,14 @@ class Homing:
     def _find_edge(
         self, s: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
     ) -> Generator[None, None, bool]:
-        """Slide until the switch is steadily pressed, or released."""
+        """Move until the switch is steadily pressed, or released."""
         self._switch_time = -1.0
         return self._slide(vector, share, lambda: self._is_steady(s, pressed), limit, error)
 
     def _slide(
         self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
     ) -> Generator[None, None, bool]:
-        """Move until `finished`, then to rest; its value: whether it went well."""
+        """Move until `finished`, then to rest; returns whether that succeeded."""
         cruise, fine = self._cruise, True
         cruise.aim(vector)
         while not cruise.stopped and not finished():
@@ -89,7 +89,7 @@ class Homing:
         return self._level(s.switch) == s.closed
 
     def _is_steady(self, s: Search, pressed: bool) -> bool:
-        """Whether the switch has had a level for long enough; latches the counts at which it took it."""
+        """Whether the switch has had a level for long enough; latches the counts of the change."""
         present = self._cruise.now
         if self._is_pressed(s) != pressed:
             self._switch_time = -1.0
@@ -101,7 +101,7 @@ class Homing:
         return steady
 
     def _is_backed_off(self, s: Search) -> bool:
-        """Whether braking now ends at the back-off before the edge."""
+        """Whether braking now ends at the back-off distance."""
         leader = max(range(len(s.rate)), key=lambda i: abs(s.rate[i]))
         if self._cruise.far == 0:
             self._beyond = abs(self._cruise.axes.base[leader] - self.latch[leader])

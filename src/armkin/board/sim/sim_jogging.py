@@ -1,4 +1,4 @@
-"""The simulated board's jogging: a vector that the host repeats, or the arm stops."""
+"""The simulated board's jogging: the arm moves while the host repeats its vector of rates."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ _DEAD_MAN = 0.250  # time [s] that a jog goes on after the last JOG
 
 
 class Jogging:
-    """The vector wanted, and until when."""
+    """The vector of rates, and its deadline."""
 
     def __init__(self, cruise: Cruise) -> None:
         self._cruise = cruise
@@ -22,7 +22,7 @@ class Jogging:
         self._target_rates, self._until = rate, self._cruise.now + _DEAD_MAN
 
     def run(self) -> Iterator[None]:
-        """The motion, a step a millisecond."""
+        """The motion; each item is a millisecond."""
         cruise = self._cruise
         while True:
             cruise.aim(self._target_rates)

@@ -1,8 +1,8 @@
-"""Any stretch of a trajectory as device segments: straight lines in counts with a ramp of speed, made as asked for.
+"""Converts a curved stretch of a trajectory to device segments: straight lines in counts with a ramp of speed.
 
-A segment spans so little time that its chord leaves the curve by at most the tolerance, and that its speed changes
-by about an eighth near a rest; at least 10 ms, and so much that the board's queue always reaches to a stop. It ends
-where the motors are then, fractions of a step included (`Cutter`); its ramp follows the speed along the way.
+A segment is short enough that its chord leaves the curve by at most the tolerance and that its speed changes by about
+an eighth near a rest. It lasts at least 10 ms, and long enough that the board's queue always reaches to a stop. It may
+end at a fraction of a step (`Cutter`), and its ramp follows the speed along the path. Segments are made on iteration.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Stretch
 
-_MIN_SECONDS, _MAX_SECONDS = 0.010, 0.050  # length [s] of a segment, at least and at most
-_GROWTH_SHARE = 0.12  # length of a segment, at most, as a share of the time since the start, or to the end
-_SAMPLE_PERIOD = 0.005  # time [s] between the samples from which the spans are chosen
-_QUEUED_SEGMENTS = 25  # segments that are surely in the board's queue
-_SETTLING_SHARE = 0.05  # share of the motors' accelerations with which the rounding of both ends is left behind
-_JUMP_FACTOR = 1.1  # factor on the motors' accelerations that a segment has at most
-_CHUNK_SAMPLES = 20_000  # samples looked at at once
-_BLOCK_SEGMENTS = 512  # segments made at once
+_MIN_SECONDS, _MAX_SECONDS = 0.010, 0.050  # shortest and longest segment [s]
+_GROWTH_SHARE = 0.12  # longest segment as a share of the time since the start, or to the end
+_SAMPLE_PERIOD = 0.005  # time [s] between the samples that determine the segments' lengths
+_QUEUED_SEGMENTS = 25  # segments that are always in the board's queue
+_SETTLING_SHARE = 0.05  # share of the motors' accelerations that removes the rounding of both ends
+_JUMP_FACTOR = 1.1  # largest factor on the motors' accelerations in a segment
+_CHUNK_SAMPLES = 20_000  # samples evaluated at once
+_BLOCK_SEGMENTS = 512  # segments computed at once
 
 
 @dataclass(frozen=True)
 class CurveSegments:
-    """The segments of one stretch; iterating makes them anew, in bounded memory."""
+    """The segments of one stretch, computed on each iteration in bounded memory."""
 
     arm: Arm
     stretch: Stretch
@@ -50,40 +50,40 @@ class CurveSegments:
         """The segments in order."""
         bounds = self.bounds()
         cutter = Cutter(self.start.tolist(), self.clock, self.min_interval)
-        before, span = np.zeros(len(self.start)), 0.0  # the speed at the end of the segment before, and its time
+        last_speed, span = np.zeros(len(self.start)), 0.0  # end speed and time of the last segment
         for first in range(0, len(bounds) - 1, _BLOCK_SEGMENTS):
             t = bounds[first : first + _BLOCK_SEGMENTS + 1]
             counts = self._places_at(t)
             if first + _BLOCK_SEGMENTS >= len(bounds) - 1:
                 counts[-1] = self.end
             steps = np.diff(counts, axis=0)
-            # No motor faster than its greatest rate, whatever rounding says.
+            # Rounding must not make a motor faster than its greatest rate.
             seconds = np.maximum(np.diff(t), (np.abs(steps) / self._max_rates()).max(axis=1))
             change = self._speed_changes(t, steps).tolist()
             mean = np.vstack([steps / seconds[:, None], np.zeros(len(self.start))])
             longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
-            open_end = first + _BLOCK_SEGMENTS < len(bounds) - 1  # what follows this block is not known here
-            for k in range(len(t) - 1):
-                segment, before = self._smooth_segment(
-                    cutter, float(seconds[k]), counts[k + 1].tolist(),
-                    0.0 if open_end and k + 2 == len(t) else change[k], before,
-                    max(float(seconds[k]), span), mean[k + 1], float(longer[k]),
+            open_end = first + _BLOCK_SEGMENTS < len(bounds) - 1  # the segment behind this block is not known yet
+            for i in range(len(t) - 1):
+                segment, last_speed = self._smooth_segment(
+                    cutter, float(seconds[i]), counts[i + 1].tolist(),
+                    0.0 if open_end and i + 2 == len(t) else change[i], last_speed,
+                    max(float(seconds[i]), span), mean[i + 1], float(longer[i])
                 )  # fmt: skip
-                span = float(seconds[k])
+                span = float(seconds[i])
                 yield segment
 
     def _places_at(self, t: Array) -> Array:
-        """Where the motors are at times t, fractions included: (T, motors).
+        """The motors' fractional counts at times t: (T, motors).
 
-        Both ends are whole counts; what rounding them has moved, half a step at most, is left behind as fast as
-        _SETTLING_SHARE of the motors' accelerations allow, so that in between nothing is off but the steps themselves.
+        Both ends are rounded to whole counts. The offset of at most half a step fades out as fast as _SETTLING_SHARE
+        of the motors' accelerations allows, so that positions between are exact.
         """
         duration = self.stretch.duration
         ends = exact_pulses(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
         counts = exact_pulses(self.arm, self.stretch.evaluate(t))
-        for offset, since in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
+        for offset, time_to_end in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
             span = np.sqrt(6 * np.abs(offset) / (_SETTLING_SHARE * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6
-            f = np.clip(since[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
+            f = np.clip(time_to_end[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
             counts = counts + offset * (1 - f * f * (3 - 2 * f))
         return np.asarray(counts)
 
@@ -91,23 +91,23 @@ class CurveSegments:
         self, cutter: Cutter, seconds: float, counts: list[float], change: float, start_speed: Array, begin_time: float,
         end_speed: Array, end_time: float,
     ) -> tuple[Segment, Array]:  # fmt: skip
-        """One segment and the motors' speeds at its end, its ramp taken back as far as the board asks for it.
+        """One segment and the motors' speeds at its end, its ramp reduced as far as the board needs.
 
-        start_speed: speeds at the end of the segment before; end_speed: the mean speed of the next one; begin_time,
-        end_time: the longer time of each two. Without a ramp a segment always fits: its mean follows the one before
-        within the greatest acceleration.
+        start_speed: speeds at the end of the last segment; end_speed: the mean speed of the next one; begin_time,
+        end_time: the longer time of either pair of segments. A segment without a ramp always fits, since its mean
+        speed follows the last one within the greatest acceleration.
         """
-        most = _JUMP_FACTOR * motor_accel(self.arm)
+        max_accel = _JUMP_FACTOR * motor_accel(self.arm)
         state = list(cutter.places), cutter.late
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
             cutter.places, cutter.late = list(state[0]), state[1]
             segment = cutter.piece(seconds, counts, change * share)
             rate = np.array(segment.rates) * (self.clock / STEP)
             begin, end = rate / segment.interval, rate / segment.last_interval
-            slow = (np.abs(begin - start_speed) <= most * begin_time).all() and (
-                np.abs(end - begin) <= most * seconds
+            fits = (np.abs(begin - start_speed) <= max_accel * begin_time).all() and (
+                np.abs(end - begin) <= max_accel * seconds
             ).all()
-            if share == 0.0 or (slow and (np.abs(end_speed - end) <= most * end_time).all()):
+            if share == 0.0 or (fits and (np.abs(end_speed - end) <= max_accel * end_time).all()):
                 break
         return segment, end
 
@@ -116,24 +116,24 @@ class CurveSegments:
         return np.asarray(np.abs(self.arm.motor_gain) @ self.arm.max_speed)
 
     def _speed_changes(self, t: Array, steps: Array) -> Array:
-        """How much the speed changes in every segment, see `Cutter.piece`: (segments,).
+        """The relative change of speed in every segment, see `Cutter.piece`: (segments,).
 
-        As the speed along the way does, but so that no motor's speed jumps where two segments meet, nor changes in
-        one, by more than 1.1 of what its greatest acceleration makes: the board refuses 1.25. On a curve motors speed
-        up and slow down at once, and a segment has one ramp for all.
+        It follows the speed along the path, but is limited so that no motor's speed changes within a segment, or jumps
+        between two, by more than 1.1 of its greatest acceleration; the board refuses 1.25. The limit is needed since on
+        a curve some motors speed up while others slow down, and a segment has one ramp for all.
         """
         gain = self.arm.motor_gain.T
         speed = np.linalg.norm(self.stretch.evaluate(t, 1) @ gain, axis=1).tolist()
         change = np.array([speed_change(a, b) for a, b in pairwise(speed)])
         h = np.diff(t)[:, None]
-        most = _JUMP_FACTOR * motor_accel(self.arm)
-        ramp = change[:, None] * steps / h**2  # what the segment makes of each motor's acceleration
+        max_accel = _JUMP_FACTOR * motor_accel(self.arm)
+        ramp = change[:, None] * steps / h**2  # each motor's acceleration in the segment
         size = np.maximum(np.abs(ramp), 1e-12)
-        share = np.minimum((most / size).min(axis=1), 1.0)
-        spare = np.maximum(self._max_rates() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
-        share = np.minimum(share, 2 * spare / np.maximum(np.abs(change), 1e-12))
+        share = np.minimum((max_accel / size).min(axis=1), 1.0)
+        reserve = np.maximum(self._max_rates() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
+        share = np.minimum(share, 2 * reserve / np.maximum(np.abs(change), 1e-12))
         for end in (self.stretch.evaluate(t[:-1] + 1e-9, 2) @ gain, self.stretch.evaluate(t[1:] - 1e-9, 2) @ gain):
-            room = (np.maximum(most + end * np.sign(ramp), 0.0) / size).min(axis=1)
+            room = (np.maximum(max_accel + end * np.sign(ramp), 0.0) / size).min(axis=1)
             share = np.minimum(share, room)
         return np.asarray(share * change)
 
@@ -141,7 +141,7 @@ class CurveSegments:
         return len(self.bounds()) - 1
 
     def bounds(self) -> Array:
-        """Times where segments end, from 0 to the duration: (segments + 1,) [s]."""
+        """The times between segments, from 0 to the duration: (segments + 1,) [s]."""
         duration = self.stretch.duration
         t = np.linspace(0.0, duration, max(int(duration / _SAMPLE_PERIOD), 16))
         level = self._density(t)  # segments a second, then segments since the beginning
@@ -156,51 +156,53 @@ class CurveSegments:
         return np.asarray(times)
 
     def _density(self, t: Array) -> Array:
-        """How many segments a second are wanted at times t, which cover the stretch evenly: (T,)."""
+        """The number of segments a second needed at evenly spaced times t over the stretch: (T,)."""
         duration, step = self.stretch.duration, float(t[1])
         density, first = np.empty(len(t)), 0
-        behind = np.zeros(0)  # times to a stop just before a part, as many as may reach into it
+        earlier_stops = np.zeros(0)  # stopping times before a part that reach into it
         for part in np.array_split(t, max(len(t) // _CHUNK_SAMPLES, 1)):
             span, stop = self._span_limits(part)
             span = np.minimum(span, _GROWTH_SHARE * np.minimum(part, duration - part))
-            stop_times = np.concatenate([behind, stop])
-            span = np.maximum(np.clip(span, _MIN_SECONDS, _MAX_SECONDS), _least_spans(stop_times, step)[len(behind) :])
+            stop_times = np.concatenate([earlier_stops, stop])
+            span = np.maximum(
+                np.clip(span, _MIN_SECONDS, _MAX_SECONDS), _least_spans(stop_times, step)[len(earlier_stops) :]
+            )
             density[first : first + len(part)] = 1.0 / span
             first += len(part)
-            behind = stop_times[-int(stop_times.max() / step) - 1 :]
+            earlier_stops = stop_times[-int(stop_times.max() / step) - 1 :]
         return density
 
     def _span_limits(self, t: Array) -> tuple[Array, Array]:
-        """At times t: how long a chord may be [s], and the time to a stop [s] of the motor that needs longest.
+        """The longest chord [s] and the longest stopping time [s] of a motor, at times t: (T,) each.
 
-        A chord that may be longer than any segment, with joints that bear on the tip no more than the arm's reach
-        lets them, is not looked at more closely: it may be of any length.
+        A chord counts as unlimited (inf) where a bound from the arm's reach shows that it may be longer than any
+        segment.
         """
         arm, qd, qdd = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
         stop = (np.abs(qd @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
         lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
-        tight = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
-        J = jacobian(arm, self.stretch.evaluate(t[tight]))[:, :3]
-        v, bend = ((J @ x[tight, :, None])[..., 0] for x in (qd, qdd))
-        along = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
-        across = np.linalg.norm(bend - along * (along * bend).sum(axis=1, keepdims=True), axis=1)
+        limited = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
+        J = jacobian(arm, self.stretch.evaluate(t[limited]))[:, :3]
+        v, accel = ((J @ x[limited, :, None])[..., 0] for x in (qd, qdd))
+        tangent = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
+        normal_accel = np.linalg.norm(accel - tangent * (tangent * accel).sum(axis=1, keepdims=True), axis=1)
         span = np.full(len(t), np.inf)
-        span[tight] = np.sqrt(8 * self.tolerance / np.maximum(across, 1e-9))
+        span[limited] = np.sqrt(8 * self.tolerance / np.maximum(normal_accel, 1e-9))
         return span, stop
 
 
 def _least_spans(stop: Array, step: float) -> Array:
-    """Least span of segments so that `_QUEUED_SEGMENTS` of them always reach to a stop; samples `step` [s] apart.
+    """The shortest segments of which `_QUEUED_SEGMENTS` always reach to a stop, at samples `step` [s] apart.
 
-    What moves now and needs u to a stop asks that of all segments within the next u.
+    A stopping time u at some moment applies to all segments within the following time u.
     """
-    need = stop / _QUEUED_SEGMENTS
-    least = need.copy()
-    if float(need.max(initial=0.0)) <= _MIN_SECONDS:  # no segment is shorter
-        return least
+    needed = stop / _QUEUED_SEGMENTS
+    shortest = needed.copy()
+    if float(needed.max(initial=0.0)) <= _MIN_SECONDS:  # segments are never shorter
+        return shortest
     for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
-        least[d:] = np.maximum(least[d:], np.where(stop[:-d] >= d * step, need[:-d], 0.0))
-    return least
+        shortest[d:] = np.maximum(shortest[d:], np.where(stop[:-d] >= d * step, needed[:-d], 0.0))
+    return shortest
 
 
 def sampled_rates(arm: Arm, stretch: Stretch) -> Array:

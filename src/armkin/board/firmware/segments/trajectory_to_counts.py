@@ -1,4 +1,4 @@
-"""A trajectory as a board with our firmware drives it: moves of exact segments, refused where it is too fast.
+"""Converts a trajectory to moves of exact segments for a board with our firmware, unless it is too fast for it.
 
 Trajectory (joints, seconds)  --cut-->  Cut (counts, clock cycles)  --FirmwareMachine.run-->  frames
 """
@@ -33,21 +33,21 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 
-TOLERANCE = 0.05  # distance [mm] between the chord of a segment and its curve
+TOLERANCE = 0.05  # largest distance [mm] between a segment's chord and its curve
 
 
-MAX_COUNTS = 2**30  # position [counts], at most: half of what a board's registers hold
+MAX_COUNTS = 2**30  # largest position [counts]: half the range of a board's registers
 
 
 class RateError(UsageError):
-    """A motor is asked for more than the board makes; fields: share, what the board makes of it."""
+    """A motor needs a higher rate than the board makes; the field `share` has the possible fraction."""
 
 
 @dataclass(frozen=True)
 class Cut(StartedTrajectory):
-    """A trajectory on this board."""
+    """A trajectory in counts and clock cycles of a board with our firmware."""
 
-    ends: Counts  # (stretches, motors) where each stretch ends
+    ends: Counts  # (stretches, motors) counts at the end of each stretch
     top_rate: Array  # (motors,) [counts/s] greatest rate of every motor
     clock: int
     min_interval: int
@@ -75,7 +75,7 @@ class Cut(StartedTrajectory):
         return number
 
     def moves(self, pieces: Callable[[], Pieces] = lambda: Pieces.FINE) -> Iterator[Move]:
-        """The moves, one a stretch, made as they are asked for; pieces: asked then, of lines."""
+        """The moves in order, one for each stretch; pieces: gives the division of ramps, called for each line."""
         begin = self.start
         for stretch, end in zip(self.trajectory.stretches, self.ends, strict=True):
             yield self._move_of(stretch, begin, end, pieces())
@@ -87,8 +87,8 @@ class Cut(StartedTrajectory):
 
     def _move_of(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
         if self._is_line(stretch, start, end):
-            a, b, least = start.tolist(), end.tolist(), self.min_interval
-            return line_segments(a, b, stretch.law, clock=self.clock, min_interval=least, pieces=pieces)
+            a, b, interval = start.tolist(), end.tolist(), self.min_interval
+            return line_segments(a, b, stretch.law, clock=self.clock, min_interval=interval, pieces=pieces)
         arm = self.trajectory.arm
         parts = CurveSegments(
             arm=arm,
@@ -113,17 +113,17 @@ def cut_trajectory(
     arm, first = trajectory.arm, np.asarray(start, dtype=np.int64)
     ends = [pulses(arm, stretch.end) for stretch in trajectory.stretches]
     for end in ends:
-        if (far := int(np.abs(end).argmax())) >= 0 and abs(end[far]) > MAX_COUNTS:
+        if (k := int(np.abs(end).argmax())) >= 0 and abs(end[k]) > MAX_COUNTS:
             raise UsageError(
-                f"motor {motor_names(arm)[far]} would stand at {end[far]:,} counts; a board counts to {MAX_COUNTS:,}"
+                f"motor {motor_names(arm)[k]} would stand at {end[k]:,} counts; a board counts to {MAX_COUNTS:,}"
             )
     top = np.zeros(len(first))
     begin, allowed = first, clock / min_interval
     for stretch, end in zip(trajectory.stretches, ends, strict=True):
-        needed = _greatest_rates(arm, stretch, begin, end)
-        if needed.max(initial=0.0) > allowed:
-            raise _too_fast(arm, stretch, needed, allowed)
-        top, begin = np.maximum(top, needed), end
+        rates = _greatest_rates(arm, stretch, begin, end)
+        if rates.max(initial=0.0) > allowed:
+            raise _too_fast(arm, stretch, rates, allowed)
+        top, begin = np.maximum(top, rates), end
     return Cut(trajectory, first, np.array(ends, dtype=np.int64).reshape(-1, len(first)), top, clock, min_interval)
 
 
@@ -150,9 +150,9 @@ def plan_moves(
     check_rates(arm)
     goals = np.atleast_2d(np.asarray(targets, dtype=float))
     check_limits(arm, goals)
-    # In whole steps a goal may be half a step outside the limits: the board counts that as within them.
-    made = np.clip(joints_of(arm, pulses(arm, goals)), arm.lower, arm.upper)
-    trajectory = plan_joints(arm, joints_of(arm, np.asarray(start)), made, speed=speed)
+    # Rounding to whole steps may take a goal half a step outside the limits, which the board accepts.
+    rounded_goals = np.clip(joints_of(arm, pulses(arm, goals)), arm.lower, arm.upper)
+    trajectory = plan_joints(arm, joints_of(arm, np.asarray(start)), rounded_goals, speed=speed)
     try:
         return cut_trajectory(trajectory, start, clock=clock, min_interval=min_interval)
     except RateError as error:
@@ -169,11 +169,11 @@ def _greatest_rates(arm: Arm, stretch: Stretch, start: Counts, end: Counts) -> A
 
 def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateError:
     k = int(rates.argmax())
-    top = stretch.top_speed
-    joint = int(np.argmax(np.abs(arm.motor_gain[k]) * top))
+    speeds = stretch.top_speed
+    joint = int(np.argmax(np.abs(arm.motor_gain[k]) * speeds))
     unit, word = float(units.joint_scale(arm)[joint]), f"{units.unit_names(arm)[joint]}/s"
     return RateError(
-        f"joint {arm.joint_names[joint]} at {top[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
+        f"joint {arm.joint_names[joint]} at {speeds[joint] / unit:.4g} {word} needs {rates[k]:,.0f} counts/s of motor "
         f"{motor_names(arm)[k]}; the board makes {allowed:,.0f}",
         joint=arm.joint_names[joint],
         motor=motor_names(arm)[k],

@@ -1,4 +1,4 @@
-"""The configuration image: all that a board knows of its arm (firmware/PROTOCOL.md, section 4)."""
+"""The configuration image, which has all data that a board needs of its arm (firmware/PROTOCOL.md, section 4)."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class AxisImage:
 
 @dataclass(frozen=True)
 class GuardImage:
-    """A limit switch: while it is pressed, nothing moves with a positive sum of weight x rate."""
+    """A limit switch, which forbids motion with a positive sum of weight x rate while it is pressed."""
 
     closed: bool = False  # normally closed
     weight: tuple[int, ...] = ()  # a byte each; all 0: the switch guards nothing
@@ -39,7 +39,7 @@ class GuardImage:
 
 @dataclass(frozen=True)
 class RowImage:
-    """lower <= sum of weight x count <= upper."""
+    """The limit lower <= sum of weight x count <= upper."""
 
     lower: int
     upper: int
@@ -48,7 +48,7 @@ class RowImage:
 
 @dataclass(frozen=True)
 class Image:
-    """All that a board knows of the arm; times in 0.1 us, `wake` in ms."""
+    """The data that a board needs of its arm; times in 0.1 us, `wake` in ms."""
 
     axes: tuple[AxisImage, ...]
     rows: tuple[RowImage, ...] = ()
@@ -78,7 +78,7 @@ class Image:
 
     @classmethod
     def unpack(cls, raw: bytes, switches: int) -> Image | None:
-        """The image of its bytes; None if layout or length are wrong (ranges are the board's to check)."""
+        """The image in some bytes; None if layout or length are wrong. The board checks the ranges."""
         if len(raw) < 12:
             return None
         layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", raw)
@@ -109,5 +109,5 @@ class Image:
         return cls(tuple(axes), tuple(limits), tuple(guards), *bits, high, low, setup, wake, meaning)
 
     def crc(self) -> int:
-        """What INFO's `config` says while this image is in force."""
+        """The value of INFO's `config` while this image is active."""
         return zlib.crc32(self.pack())

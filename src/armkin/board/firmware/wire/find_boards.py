@@ -1,4 +1,4 @@
-"""The boards that are plugged in and answer: what a command speaks to that names no port."""
+"""Finds the connected boards that answer, for commands without a port name."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def answering_ports(
 ) -> list[str]:
     """Names of the ports behind which a board with armkin's firmware answers.
 
-    number: the board's as INFO says it; None: any. Only ports that look like an Arduino are opened (which
-    resets most of them: an arm that stands still keeps its position), and none that another program holds.
+    number: the board number in INFO; None: any. Only ports that look like an Arduino and are free are opened. That
+    resets most boards, which keep their position while the arm is at rest.
     """
     return [name for name in likely_ports() if _board_answers(name, number, baud, stop, reset)]
 

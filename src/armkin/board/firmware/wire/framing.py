@@ -1,4 +1,4 @@
-"""Payloads to bytes on the line and back (firmware/PROTOCOL.md, section 1).
+"""Converts payloads to bytes on the line and back (firmware/PROTOCOL.md, section 1).
 
 payload  --encode_frame-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
 """
@@ -58,13 +58,13 @@ def decode_frame(frame: bytes) -> bytes | None:
 
 
 class Splitter:
-    """Cuts a stream of bytes into payloads; counts what was damaged in `bad`."""
+    """Splits a stream of bytes into payloads, and counts damaged frames in `bad`."""
 
     def __init__(self, largest: int = MAX_FRAME) -> None:
         self.bad = 0
         self._largest = largest + 1
         self._incomplete = bytearray()
-        self._skip = False  # the frame is too long already
+        self._skip = False  # whether the present frame is too long
 
     def feed(self, received: bytes) -> Iterator[bytes]:
         """The payloads that `received` completes."""

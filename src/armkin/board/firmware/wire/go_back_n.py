@@ -1,7 +1,7 @@
 """Frames in sequence: go-back-N, with credit in segments and in bytes (firmware/PROTOCOL.md, section 3).
 
-What is submitted is sent in order, kept until it is acknowledged, and sent again when it is not. A frame is executed
-once or not at all, however often it is sent.
+Submitted frames are sent in order, kept until they are acknowledged, and sent again if they are not. The board executes
+a frame at most once, no matter how often it is sent.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from armkin.board.firmware.wire import protocol, reply_checks
 from armkin.board.firmware.wire.protocol import Ack, Error, Info, Status
 from armkin.board.firmware.wire.serial_line import Line
 
-_RESEND_TIMEOUT = 0.03  # time [s] without progress, beyond that of the slowest answer, until frames are sent again
-_GAP_TIME = 0.004  # time [s] after all that was sent has left and an answer had its time
-_ASK_DELAY = 0.012  # time [s] without progress before a question is to find out
-_NOISY_RESEND = 0.002  # time [s] without progress on a bad line: nothing is gained by waiting for what was damaged
-_UNDER_WAY = 1, 16  # frames under way, on a bad line, where what follows a lost one is for nothing, and on a good one
-_MAX_BYTES = (240, 700)  # bytes under way, on a bad line and on a good one
+_RESEND_TIMEOUT = 0.03  # time [s] without progress, beyond the slowest answer, after which frames are sent again
+_GAP_TIME = 0.004  # the same after a known loss
+_ASK_DELAY = 0.012  # time [s] without progress after which the status is requested
+_NOISY_RESEND = 0.002  # the same on a bad line, where waiting is useless
+_UNDER_WAY = 1, 16  # most unacknowledged frames, on a bad and on a good line
+_MAX_BYTES = (240, 700)  # most unacknowledged bytes, on a bad and on a good line
 QUESTION_BYTES = 12  # size [bytes] of a STATUS? on the line
 
 
@@ -34,7 +34,7 @@ class _Frame:
 
 
 class Window:
-    """Frames on their way to the board."""
+    """The frames that are not acknowledged yet, and the credit of the board."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
@@ -43,20 +43,20 @@ class Window:
         self._next = 0  # sequence number of the first of them
         self._free = 0
         self._receive = 0
-        self._gap = False  # the first of those that were sent is lost for certain
-        self._sent_at = 0.0  # time at which any was written last
-        self._deaf = 0.0  # until then an answer may be to what was sent before the last going back
-        self._bytes = _MAX_BYTES[1]  # bytes that may be under way
+        self._gap = False  # whether the first sent frame is known to be lost
+        self._sent_at = 0.0  # time of the last frame written
+        self._deaf = 0.0  # until this time an answer may belong to frames before the last going back
+        self._bytes = _MAX_BYTES[1]  # bytes that may be unacknowledged
 
     def begin(self, info: Info) -> None:
-        """Start with a new session: nothing is under way, the queue is empty."""
+        """Begin a new session without unacknowledged frames and with an empty queue."""
         self._waiting.clear()
         self._sent.clear()
         self._next, self._free, self._receive = 0, info.queue, info.receive
         self._gap = False
 
     def clear(self) -> None:
-        """Forget what was not sent."""
+        """Drop the frames that are not sent yet."""
         self._waiting.clear()
 
     def submit(self, make: Callable[[int], bytes], segments: int, seconds: float) -> None:
@@ -74,7 +74,7 @@ class Window:
 
     @property
     def out_of_credit(self) -> bool:
-        """Whether something waits for credit, and nothing is under way that would bring it."""
+        """Whether frames wait for credit and no unacknowledged frame will bring any."""
         return bool(self._waiting) and not self._sent
 
     @property
@@ -83,18 +83,18 @@ class Window:
         return sum(f.seconds for f in self._waiting) + sum(f.seconds for f, _ in self._sent)
 
     def send(self) -> None:
-        """Send new frames as far as credit and window allow, and all of them again when nothing has come for long."""
-        begun = self._line.port.now()
+        """Send new frames as far as credit and window allow, and send all again after a time without answers."""
+        time = self._line.port.now()
         self._fill()
-        beyond_slowest = _GAP_TIME if self._gap else _RESEND_TIMEOUT
-        patience = _NOISY_RESEND if self._line.noisy else self._line.slowest + beyond_slowest
-        if self._sent and begun - self._line.clear > patience:
+        margin = _GAP_TIME if self._gap else _RESEND_TIMEOUT
+        timeout = _NOISY_RESEND if self._line.noisy else self._line.slowest + margin
+        if self._sent and time - self._line.clear > timeout:
             self._go_back(0, len(self._sent[0][1]))
-        elif self._gap and not self._line.noisy and begun > self._deaf:
-            # what told of it was the answer to the second or a later one: the oldest without one is the third
-            behind = sum(len(frame_bytes) for _, frame_bytes in islice(self._sent, 3, None))
-            if behind + len(self._sent[0][1]) <= self._receive - QUESTION_BYTES:
-                self._go_back(behind, 0)
+        elif self._gap and not self._line.noisy and time > self._deaf:
+            # the answer to the second or a later frame showed the loss, so the third is the oldest without an answer
+            bytes_behind = sum(len(frame_bytes) for _, frame_bytes in islice(self._sent, 3, None))
+            if bytes_behind + len(self._sent[0][1]) <= self._receive - QUESTION_BYTES:
+                self._go_back(bytes_behind, 0)
 
     @property
     def late(self) -> bool:
@@ -121,8 +121,8 @@ class Window:
     def _fill(self) -> None:
         credit = self._credit
         size = sum(len(frame_bytes) for _, frame_bytes in self._sent)
-        most = _UNDER_WAY[0 if self._line.noisy else 1]
-        while self._waiting and len(self._sent) < most:
+        max_frames = _UNDER_WAY[0 if self._line.noisy else 1]
+        while self._waiting and len(self._sent) < max_frames:
             if self._waiting[0].segments > credit:
                 return
             frame_bytes = protocol.encode_frame(self._waiting[0].make((self._next + len(self._sent)) & 255))
@@ -139,17 +139,17 @@ class Window:
     def _go_back(self, size: int, first: int) -> None:
         """Go back to the first frame that was not acknowledged.
 
-        size: bytes under way behind the oldest frame without an answer, first: of it what need not fit the ring.
+        size: unacknowledged bytes behind the oldest frame; first: bytes of that frame that need not fit the buffer.
         """
         self._gap = False
         self._bytes = _MAX_BYTES[0] if self._line.noisy else max(_MAX_BYTES[0], self._bytes // 2)
         self._sent_at = self._line.port.now()
         self._deaf = max(self._sent_at, self._line.clear) + self._line.slowest + _GAP_TIME
         self._line.write(b"\0")
-        for k, (_, frame_bytes) in enumerate(self._sent):
+        for number, (_, frame_bytes) in enumerate(self._sent):
             room = self._room(size, first)
-            if k and len(frame_bytes) > room:
-                break  # what follows it would wait for it
+            if number and len(frame_bytes) > room:
+                break  # later frames would have to wait for it
             self._line.resent += 1
             size += self._line.write_frame(frame_bytes, room)
 
@@ -158,7 +158,7 @@ class Window:
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
     def acknowledge(self, reply: Ack | Status, requested: float = 0.0) -> int:
-        """Take a reply's `next` and `free`, asked for then; the number of frames that it acknowledges."""
+        """Process a reply's `next` and `free`, and count the frames that it acknowledges; requested: request time."""
         count = (reply.next - self._next) & 255
         if count > len(self._sent):
             return 0
@@ -171,5 +171,5 @@ class Window:
         elif self._sent and (
             type(reply) is Ack or requested > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):
-            self._gap = True  # something behind the first frame has arrived, the first has not
+            self._gap = True  # a later frame has arrived and the first has not
         return count

@@ -61,7 +61,7 @@ class MotionFrame:
 
     @property
     def seconds(self) -> float:
-        """About how long it takes."""
+        """The approximate duration."""
         return sum(s.units() for s in self.segments) * 256 / self.clock
 
     def payload(self, tag: int) -> bytes:

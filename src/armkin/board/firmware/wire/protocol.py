@@ -56,7 +56,7 @@ class Type(IntEnum):
 
 
 class State(IntEnum):
-    """What the board is doing."""
+    """The state of the board."""
 
     IDLE = 0
     MOVING = 1
@@ -121,7 +121,7 @@ MOTION_GENTLE, GENTLE_PARTS = 2, 8  # lowest bit of the share of the acceleratio
 
 @dataclass(frozen=True)
 class Ack:
-    """Answer to everything but HELLO and STATUS?."""
+    """The answer to every frame except HELLO and STATUS?."""
 
     next: int
     error: int
@@ -134,12 +134,12 @@ class Ack:
 
 @dataclass(frozen=True)
 class Credit(Ack):
-    """An ACK that comes unasked, when slots have become free; nothing was lost because of it."""
+    """An ACK that the board sends on its own when slots become free; it shows no loss."""
 
 
 @dataclass(frozen=True)
 class Info:
-    """Answer to HELLO: who the board is and what it can do."""
+    """The answer to HELLO: the identity and the abilities of the board."""
 
     tag: int
     version: int
@@ -164,7 +164,7 @@ class Info:
 
 @dataclass(frozen=True)
 class Status:
-    """Answer to STATUS?: where the board stands."""
+    """The answer to STATUS?: state, position and queue of the board."""
 
     tag: int
     next: int
@@ -181,7 +181,7 @@ class Status:
     page: int
     session: int
     counts: tuple[int, ...]
-    late_servos: int = 0  # frames of servo pulses; firmware of before it was told says nothing
+    late_servos: int = 0  # late frames of servo pulses; 0 from old firmware
 
 
 Reply = Ack | Info | Status
@@ -195,37 +195,37 @@ _STATUS = struct.Struct("<8BHH4BH")
 
 
 def hello(tag: int, nonce: int, version: int = VERSION) -> bytes:
-    """Opens a session."""
+    """The HELLO frame, which opens a session."""
     return struct.pack("<BBBI", Type.HELLO, tag, version, nonce)
 
 
 def status_query(tag: int, page: int = 0) -> bytes:
-    """Asks where the board stands."""
+    """The STATUS? frame, which requests a page of the status."""
     return struct.pack("<BBB", Type.STATUS_QUERY, tag, page)
 
 
 def hold(tag: int) -> bytes:
-    """Stops the arm along its path."""
+    """The HOLD frame, which stops the arm along its path."""
     return struct.pack("<BB", Type.HOLD, tag)
 
 
 def config(tag: int, offset: int, piece: bytes) -> bytes:
-    """Writes a piece of the configuration image."""
+    """The CONFIG frame, which writes a piece of the configuration image."""
     return struct.pack("<BBH", Type.CONFIG, tag, offset) + piece
 
 
 def commit(tag: int, length: int, crc: int) -> bytes:
-    """Brings the image into force."""
+    """The COMMIT frame, which activates the image."""
     return struct.pack("<BBHI", Type.COMMIT, tag, length, crc)
 
 
 def enable(tag: int, switches: int) -> bytes:
-    """Drivers on (bit 0), servo pulses on (bit 1)."""
+    """The ENABLE frame, which switches drivers (bit 0) and servo pulses (bit 1) on."""
     return struct.pack("<BBB", Type.ENABLE, tag, switches)
 
 
 def set_position(tag: int, counts: dict[int, int]) -> bytes:
-    """Says what the counts are: {axis: count}."""
+    """The SET_POSITION frame, which sets counts: {axis: count}."""
     axes = sorted(counts)
     return struct.pack(f"<BBH{len(axes)}i", Type.SET_POSITION, tag, mask_of(axes), *(counts[i] for i in axes))
 
@@ -241,13 +241,13 @@ def home(
     time: int,
     rate: Sequence[int],
 ) -> bytes:
-    """Moves until a switch says so; `time` in 0.1 s, the rest in counts."""
+    """The HOME frame, which moves until a switch closes; `time` in 0.1 s, other values in counts."""
     form = f"<BBBBBIIH{len(rate)}i"
     return struct.pack(form, Type.HOME, tag, switch, int(closed), slow, backoff, travel, time, *rate)
 
 
 def jog(tag: int, rate: Sequence[int]) -> bytes:
-    """Moves with `rate` [counts/s] per axis for the next 250 ms."""
+    """The JOG frame, which moves at `rate` [counts/s] per axis for the next 250 ms."""
     return struct.pack(f"<BB{len(rate)}i", Type.JOG, tag, *rate)
 
 
@@ -260,7 +260,7 @@ def mask_of(axes: Iterable[int]) -> int:
 
 
 def parse_reply(payload: bytes) -> Reply | None:
-    """A reply; None for anything that no board of this version sends."""
+    """The reply in a payload; None for payloads that no board of this version sends."""
     kind, size = payload[0], len(payload)
     if kind == Type.ACK and size == _ACK.size:
         return Ack(*_ACK.unpack(payload)[1:])
@@ -277,7 +277,7 @@ def parse_reply(payload: bytes) -> Reply | None:
 
 
 def info_version(payload: bytes) -> int | None:
-    """The protocol version in any version's INFO: offsets 0 to 2 stay."""
+    """The protocol version in an INFO of any version, whose first three bytes never change."""
     return payload[2] if payload[0] == Type.INFO and len(payload) > 2 else None
 
 

@@ -1,4 +1,4 @@
-"""What a board may say: every field of its replies in its range, or the link is at an end."""
+"""Checks that every field of a board's replies is in its range; an error ends the session."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _INFO: dict[str, tuple[int, int]] = {
 
 
 class DeviceError(LinkError):
-    """The board has ended the session: `error` is its code, `detail` the axis, row or segment."""
+    """Raised when the board ends the session; `error` is its code, `detail` the axis, row or segment."""
 
     def __init__(self, error: int, detail: int, state: int) -> None:
         self.error = Error(error) if error in Error._value2member_map_ else Error.OK
@@ -28,11 +28,11 @@ class DeviceError(LinkError):
 
 
 class ReplacedError(LinkError):
-    """Another program has opened a session with the board: this one is over."""
+    """Raised when another program has opened a session with the board."""
 
 
 class BoardSaysError(LinkError):
-    """The board says what no board with this firmware can say; fields: field, value."""
+    """Raised for a value that no board with this firmware sends; fields: field, value."""
 
 
 def _impossible_value_error(port: str, field: str, value: object, allowed: str) -> BoardSaysError:
@@ -46,7 +46,7 @@ def _impossible_value_error(port: str, field: str, value: object, allowed: str) 
 
 
 def other_version(port: str, version: int) -> LinkError:
-    """The board's firmware speaks another version of the protocol."""
+    """The error for firmware with another version of the protocol."""
     return LinkError(
         f"the firmware of the board on {port} speaks protocol {version}, this armkin {VERSION}: nothing was moved\n"
         "armkin flash writes the firmware that came with this armkin (in a clone: make -C firmware flash BOARD=...)",
@@ -57,11 +57,11 @@ def other_version(port: str, version: int) -> LinkError:
 
 
 def check_info(info: Info, port: str) -> None:
-    """Raise BoardSaysError for an INFO that cannot be."""
-    for field, (least, most) in _INFO.items():
+    """Raise BoardSaysError for an INFO with an impossible value."""
+    for field, (low, high) in _INFO.items():
         value = getattr(info, field)
-        if not least <= value <= most:
-            raise _impossible_value_error(port, field, value, f"{least} to {most}")
+        if not low <= value <= high:
+            raise _impossible_value_error(port, field, value, f"{low} to {high}")
     for field in ("known", "servos"):
         value = getattr(info, field)
         if value >> info.axes:
@@ -69,7 +69,7 @@ def check_info(info: Info, port: str) -> None:
 
 
 def check_reply(reply: Ack | Status, info: Info, port: str) -> None:
-    """Raise BoardSaysError for an ACK or STATUS that cannot be."""
+    """Raise BoardSaysError for an ACK or STATUS with an impossible value."""
     if reply.state > max(State):
         raise _impossible_value_error(port, "state", reply.state, f"0 to {int(max(State))}")
     if reply.error > max(Error):

@@ -1,4 +1,4 @@
-"""One segment of motion: what its fields mean, and its two forms on the line (firmware/PROTOCOL.md, section 6)."""
+"""A segment of motion: its fields, and its two forms on the line (firmware/PROTOCOL.md, section 6)."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from dataclasses import dataclass, replace
 STEP = 1 << 23  # units of a rate and of a place in one step
 HALF = STEP // 2  # place of an axis at rest, above its count
 COARSE_UNIT = 1 << 8  # unit of rates from 2^-8 step a tick on, in units of a rate
-FINE_BOUND = 1 << 15  # bound of smaller rates, which are sent in units of 1
-_MAX_RATE = STEP - 128  # greatest rate: a step a tick, but for 2^-16
+FINE_BOUND = 1 << 15  # rates below this bound are sent in units of 1
+_MAX_RATE = STEP - 128  # greatest rate, 2^-16 below a step a tick
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
 
 @dataclass(frozen=True)
 class Segment:
-    """T ticks, the first after `interval` cycles; a rate per axis.
+    """A segment of T ticks, the first after `interval` cycles, with a rate for each axis.
 
     rates: 2^-23 steps a tick, signed; from 2^-8 step on multiples of `COARSE_UNIT`, or STEP - 128. An axis at place P
     is at P + T x rate afterwards, and its count is P >> 23. The interval grows by `add` [2^-16 cycles] with each
@@ -36,7 +36,7 @@ class Segment:
         return replace(self, rates=tuple(self.rates[k] for k in axes))
 
     def interval_after(self, ticks: int) -> int:
-        """Cycles to the tick after so many, not rounded from tick to tick."""
+        """Cycles of the interval behind `ticks` ticks, without rounding from tick to tick."""
         if self.quick:
             return self.interval + (self.add * ticks >> 16) + (self.bend * (ticks * (ticks - 1) // 2) >> 17)
         blocks, ticks_left = divmod(max(0, ticks - (self.ticks - 1) % BLOCK - 1), BLOCK)
@@ -57,18 +57,18 @@ class Segment:
 
     @property
     def growth(self) -> tuple[int, int]:
-        """What `add` grows by [2^-24 cycle], and with every how many ticks, counted from the end."""
+        """The growth of `add` [2^-24 cycle], and the number of ticks between two growths, counted from the end."""
         return (128 * self.bend, 1) if self.quick else (4 * self.bend, BLOCK)
 
     @property
     def narrow(self) -> bool:
-        """True if it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
+        """Whether it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
         coarse = all(r % COARSE_UNIT == 0 or abs(r) == _MAX_RATE for r in self.rates)
         return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
 
     @property
     def steps(self) -> tuple[int, ...]:
-        """Steps that it makes if it begins in the middle between two, as at rest."""
+        """Steps of every axis if the segment begins in the middle between two steps, as at rest."""
         return tuple((HALF + self.ticks * r) >> 23 for r in self.rates)
 
     def units(self) -> int:
@@ -77,7 +77,7 @@ class Segment:
 
 
 def nearest_rate(exact: float) -> int:
-    """The rate nearest to one in 2^-23 steps a tick that a wide segment can say."""
+    """The rate of a wide segment that is nearest to `exact` [2^-23 steps a tick]."""
     if abs(exact) < FINE_BOUND - 0.5:
         return round(exact)
     return _coarse_rate(exact)

@@ -1,4 +1,4 @@
-"""The bytes between host and board: how much of them is damaged, and when all that was written will have left."""
+"""The serial line between host and board: counts damage, measures answer times, and tracks unsent bytes."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.protocol import Ack, Info, Status
 from armkin.board.ports import Port
 
-_COPIES = 3  # copies of every frame on a bad line, and of questions that nothing goes on without
-_ANSWER_TIME = 0.03  # time [s] that an answer may take
-_MIN_QUESTION_BYTES = 50  # size [bytes] of a STATUS? and its answer, at least
-_ANSWER_TIMEOUT, _SPARE_TIME = 0.05, 0.012  # times [s] for an answer, and beyond twice the slowest of those measured
+_COPIES = 3  # copies of frames on a bad line, and of important questions
+_ANSWER_TIME = 0.03  # normal time [s] of an answer
+_MIN_QUESTION_BYTES = 50  # least size [bytes] of a STATUS? and its answer
+_ANSWER_TIMEOUT, _SPARE_TIME = 0.05, 0.012  # time [s] for an answer, and margin beyond twice the slowest one
 
 
 class Line:
@@ -21,25 +21,25 @@ class Line:
         self.port = port
         self.splitter = protocol.Splitter()
         self.resent = 0  # frames
-        self.clear = 0.0  # when all that was written will have left, and something was last acknowledged
-        self.slowest = 0.0  # [s] that an answer took beyond its bytes, of those measured
+        self.clear = 0.0  # time when all written bytes have left, and of the last acknowledgement
+        self.slowest = 0.0  # longest measured time [s] of an answer, without its bytes
         self._written = 0  # frames in sequence
-        self._asked_at: dict[int, float] = {}  # tag -> when its STATUS? was written
+        self._asked_at: dict[int, float] = {}  # tag: time when its STATUS? was written
 
     @property
     def noisy(self) -> bool:
-        """Whether the line damages so much that short frames, sent several times, get through sooner."""
+        """Whether so much is damaged that short frames, each sent several times, are faster."""
         damaged = self.splitter.bad + self.resent
         return damaged > max(1.0, 0.03 * self._written)
 
     @property
     def damaged(self) -> bool:
-        """Whether anything at all was damaged or lost so far."""
+        """Whether any frame was damaged or lost so far."""
         return self.splitter.bad + self.resent > 0
 
     @property
     def copies(self) -> int:
-        """How often a question is sent that nothing goes on without."""
+        """The number of copies of an important question."""
         return _COPIES if self.damaged else 1
 
     def write(self, data: bytes) -> None:
@@ -51,11 +51,11 @@ class Line:
         """Send a frame, on a bad line as often as `room` bytes allow; the bytes written."""
         self._written += 1
         copies = max(1, min(_COPIES, room // len(frame_bytes))) if self.noisy else 1
-        self.write(frame_bytes * copies)  # a copy too many moves nothing
+        self.write(frame_bytes * copies)  # the board executes one copy
         return copies * len(frame_bytes)
 
     def replies(self, timeout: float) -> Iterator[Ack | Info | Status]:
-        """What has come, or comes within `timeout` seconds."""
+        """The replies that have arrived, or arrive within `timeout` seconds."""
         for payload in self.splitter.feed(self.port.read(timeout)):
             reply = protocol.parse_reply(payload)
             if isinstance(reply, Ack | Info | Status):
@@ -63,7 +63,7 @@ class Line:
 
     @property
     def unanswered(self) -> int:
-        """STATUS? written since the last one that was answered."""
+        """The number of STATUS? written since the last one that was answered."""
         return len(self._asked_at)
 
     def note_status_request(self, tag: int) -> None:
@@ -72,11 +72,11 @@ class Line:
 
     @property
     def patience(self) -> float:
-        """Seconds in which an answer to a STATUS? is here, if nothing was lost."""
+        """The time [s] within which an answer to a STATUS? arrives if nothing was lost."""
         return min(_ANSWER_TIMEOUT, 2 * self.slowest + _SPARE_TIME) if self.slowest else _ANSWER_TIMEOUT
 
     def take_answer(self, tag: int) -> float:
-        """When it was asked; waits as long as it was late: so long the line is behind what was written already."""
+        """The time of the request that a STATUS answers; a late answer delays `clear`, since the line is behind."""
         time_asked = self._asked_at.pop(tag, None)
         if time_asked is None:
             return 0.0

@@ -1,4 +1,4 @@
-"""A session with a board: opened, spoken in, held (firmware/PROTOCOL.md, section 3)."""
+"""A session with a board: opening, frames in sequence, status and hold (firmware/PROTOCOL.md, section 3)."""
 
 from __future__ import annotations
 
@@ -16,44 +16,44 @@ from armkin.board.ports import Port, leave_boot_loader
 from armkin.errors import LinkError
 
 _POLL_PERIOD = 0.1  # time [s] between two STATUS?: the board holds after 0.5 s of silence
-_NOISY_POLL_PERIOD = 0.025  # time [s] between two STATUS? on a bad line, which loses some of them
-_QUICK_POLL_PERIOD = 0.01  # time [s] between two while waiting for credit, which only answers bring, or for the end
-_END_MILLISECONDS = 50  # motion [ms] that the queue holds when its end is near
-_SILENCE_TIMEOUT = 1.5  # time [s] without any answer after which a board counts as gone
-_MAX_TURN_WAIT = 0.1  # time [s] that one turn counts at most: a program that waited longer for its own was deaf
-_STATUS_TIMEOUT = 3.0  # time [s] of questions without an answer, of a board that was there
-_MAX_UNANSWERED = 16  # questions without an answer
-_STALL_TIMEOUT = 5.0  # time [s] beyond what all in the queue may take
-_HOLD_TIMEOUT = 15.0  # time [s] that an arm may take to come to rest
+_NOISY_POLL_PERIOD = 0.025  # the same on a bad line, which loses some of them
+_QUICK_POLL_PERIOD = 0.01  # the same while waiting for credit or for the end
+_END_MILLISECONDS = 50  # the end is near when the queue holds less motion [ms]
+_SILENCE_TIMEOUT = 1.5  # time [s] without any answer after which the board counts as disconnected
+_MAX_TURN_WAIT = 0.1  # most time [s] of a turn that counts as silence: a suspended program hears nothing
+_STATUS_TIMEOUT = 3.0  # time [s] of status requests without an answer
+_MAX_UNANSWERED = 16  # most requests without an answer
+_STALL_TIMEOUT = 5.0  # time [s] without progress beyond the motion in the queue
+_HOLD_TIMEOUT = 15.0  # longest time [s] of a hold
 _LISTEN_DELAY = 0.2  # time [s] after the opening by which a Mega's boot loader listens
-_GREETING_TIME = 0.5  # time [s] in which a board that nothing has reset, or a Mega, answers
-_BOOT_LOADER_TIME = 1.8  # time [s] after the opening by which every boot loader that nobody spoke to has left
-_BOOT_TIMEOUT = 5.0  # time [s] that a board may take to answer after its port was opened
-_MAX_JUNK_BYTES = 1000  # bytes of what is no board's that are kept
-_PROBE_COUNT = 8  # questions that a line is judged by
+_GREETING_TIME = 0.5  # time [s] in which a board answers that was not reset, or is a Mega
+_BOOT_LOADER_TIME = 1.8  # time [s] after the opening by which every boot loader has ended
+_BOOT_TIMEOUT = 5.0  # longest time [s] from the opening of a port to an answer
+_MAX_JUNK_BYTES = 1000  # most bytes kept of foreign data
+_PROBE_COUNT = 8  # requests that test a line
 
 
 class Session:
-    """Conversation with the board behind a port; `stop` is asked all the time, and leads to a hold."""
+    """A session with the board behind a port; a True from `stop`, which is called often, leads to a hold."""
 
     def __init__(self, port: Port, stop: Callable[[], bool] = lambda: False) -> None:
         self.port = port
         self.info: Info | None = None
         self.state = State.IDLE
-        self.queued = 0  # [ms] as last heard
-        self.latest: Status | None = None  # as last heard
+        self.queued = 0  # [ms] in the last reply
+        self.latest: Status | None = None  # last status
         self.line = Line(port)
         self._window = Window(self.line)
         self._stop = stop
         self._tag = 0
         self._digest = 0
         self._status: Status | None = None
-        self.last: Ack | Status | None = None  # as last heard
+        self.last: Ack | Status | None = None  # last reply
         self._error: Ack | Status | None = None
         self.attend()
-        self.heard, self._silent_for = self._turn, 0.0  # [s] in which an answer would have been heard
+        self.heard, self._silent_for = self._turn, 0.0  # [s] of silence
         self._last_request = 0.0
-        self._until = 0.0  # something has to go on by then
+        self._until = 0.0  # deadline for progress
 
     # Opening
 
@@ -63,30 +63,30 @@ class Session:
         Raises LinkError if nothing answers, or something else than this protocol.
         """
         begin, nonce = self.port.now(), _new_nonce()
-        heard, leave = bytearray(), [_LISTEN_DELAY, _BOOT_LOADER_TIME]
+        heard, leave_times = bytearray(), [_LISTEN_DELAY, _BOOT_LOADER_TIME]
         while True:
-            since = self.port.now() - begin
-            # A few tries; then silence, for a boot loader that listens; then on to the end.
-            if leave and since > leave[0]:
+            elapsed = self.port.now() - begin
+            # Try first, then be silent for a listening boot loader, then try to the end.
+            if leave_times and elapsed > leave_times[0]:
                 leave_boot_loader(self.port)
-                del leave[0]
-                nonce = _new_nonce()  # a new session: a board counts those words as damaged frames
-            if since < _GREETING_TIME or since > _BOOT_LOADER_TIME:
-                late_patience = 0.15 if since < 3.0 else 0.4
-                info = self._greet(nonce, 0.06 if since < _GREETING_TIME else late_patience)
+                del leave_times[0]
+                nonce = _new_nonce()  # a new session, as the board counts these bytes as damaged frames
+            if elapsed < _GREETING_TIME or elapsed > _BOOT_LOADER_TIME:
+                patience = 0.15 if elapsed < 3.0 else 0.4
+                info = self._greet(nonce, 0.06 if elapsed < _GREETING_TIME else patience)
                 if info is not None:
                     return info
             else:
                 heard += self.port.read(0.05)[: _MAX_JUNK_BYTES - len(heard)]
             if self._stop():
                 raise StoppedError
-            if since > _BOOT_TIMEOUT:
+            if elapsed > _BOOT_TIMEOUT:
                 raise _no_board(self.port, bytes(heard), self.line.splitter.bad > 0)
 
     def reopen(self) -> Info:
-        """Open a new session on a board that is there: what stopped the last one is over."""
+        """Open a new session after the last one ended with an error."""
         for _ in range(8):
-            nonce = _new_nonce()  # an answer to any of these will do: a busy computer's come late
+            nonce = _new_nonce()  # accept a late answer to any of these requests
             for patience in (self.line.patience,) * 8 + (0.2,):
                 info = self._greet(nonce, patience)
                 if info is not None:
@@ -94,7 +94,7 @@ class Session:
         raise _silence_error(self.port)
 
     def _greet(self, nonce: int, timeout: float) -> Info | None:
-        """Greet the board. A repeated nonce changes nothing there: the answer to the one before serves as well."""
+        """Send HELLO and wait for INFO. Repeating a nonce is harmless, so an answer to an earlier one counts, too."""
         self._tag = (self._tag + 1) & 255
         self.port.write(b"\0" + protocol.encode_frame(protocol.hello(self._tag, nonce)) * self.line.copies)
         end = self.port.now() + timeout
@@ -119,11 +119,11 @@ class Session:
         self._renew_patience()
 
     def _renew_patience(self) -> None:
-        """Something went on: wait for the next as long as what is queued may take, and a little."""
+        """Move the deadline for progress to the end of the queued motion and a margin."""
         self._until = self.port.now() + self.queued / 1000 + _STALL_TIMEOUT
 
     def _check_stalled(self) -> None:
-        """Raise LinkError if the board has neither gone on nor come to rest in all the time that it may take."""
+        """Raise LinkError if the board has neither made progress nor come to rest by the deadline."""
         if self.port.now() > self._until:
             raise LinkError(
                 f"the board on {self.port.name} answers, but its motion stays {State(self.state).name}\n"
@@ -151,11 +151,11 @@ class Session:
         return self._window.seconds
 
     def attend(self) -> None:
-        """Begin to measure the longest time [s] that this program is deaf, and to count frames that the board takes."""
+        """Reset the longest time [s] without reading, and the count of frames that the board has taken."""
         self.deaf, self.taken, self._turn = 0.0, 0, self.port.now()
 
     def flush(self) -> None:
-        """Send what is in line, and wait until the board has executed or queued all of it."""
+        """Send all submitted frames, and wait until the board has executed or queued them."""
         while self._window:
             self.pump()
 
@@ -165,26 +165,26 @@ class Session:
         self.flush()
 
     def pump(self, timeout: float = 0.005, ends: bool = False) -> None:
-        """One turn: send what may be sent, hear what has come within `timeout`; ends: the queue does, so ask soon.
+        """One turn: send frames and process replies within `timeout`; ends: the queue ends, so poll often.
 
         Raises DeviceError when the session has ended, StoppedError after a stop, and LinkError when
         nothing answers.
         """
         if self._stop():
             raise StoppedError(self.hold())
-        before, present = self._turn, self.port.now()
-        self._turn = present
+        last_turn, time = self._turn, self.port.now()
+        self._turn = time
         self._window.send()
-        if present - self._last_request >= _between_questions(self.line, self._window, ends):
+        if time - self._last_request >= _between_questions(self.line, self._window, ends):
             self._ask()
         self._hear(timeout)
-        self.deaf = max(self.deaf, present - before, self.port.now() - present)
+        self.deaf = max(self.deaf, time - last_turn, self.port.now() - time)
         if self._error is not None:
-            if self._stop():  # a suspended sender wakes to both: the board's silence, and the wish that it stop
+            if self._stop():  # a suspended program may find both an error and a stop request
                 raise StoppedError(self.hold())
             raise DeviceError(self._error.error, self._error.detail, self._error.state)
-        self._silent_for += min(self.port.now() - present, _MAX_TURN_WAIT)
-        if self.heard >= present:
+        self._silent_for += min(self.port.now() - time, _MAX_TURN_WAIT)
+        if self.heard >= time:
             self._silent_for = 0.0
         elif self._silent_for > _SILENCE_TIMEOUT:
             raise _silence_error(self.port)
@@ -198,10 +198,10 @@ class Session:
         return self._tag
 
     def _hear(self, timeout: float) -> None:
-        """Take the replies that come within timeout [s]; LinkError for those of another session or board."""
+        """Process the replies within timeout [s]. Raises LinkError for those of another session or board."""
         for reply in self.line.replies(timeout):
             self.heard = self.port.now()
-            if isinstance(reply, Info):  # a repeated HELLO has this answer
+            if isinstance(reply, Info):  # answer to a repeated HELLO
                 reply_checks.check_session(reply.nonce & 0xFFFF, self._digest, self.port.name)
                 continue
             assert self.info is not None
@@ -225,18 +225,19 @@ class Session:
     # Questions, and stopping
 
     def status(self, page: int = 0) -> Status:
-        """Where the board stands, now; also after the session has ended."""
-        tags: list[int] = []  # asked since this was called: an answer may come later than the next question
+        """A fresh status of the board, also after the session has ended."""
+        tags: list[int] = []  # tags of this call, as an answer may arrive after the next request
         begin = self.port.now()
         while self.port.now() - begin < _STATUS_TIMEOUT:
-            tags.append(self._ask(page, self.line.copies))  # each is answered: one of them will come through
+            tags.append(self._ask(page, self.line.copies))  # several copies, in case some are lost
             end = self.port.now() + self.line.patience
             while self.port.now() < end:
                 self._status = None
                 self._hear(max(0.001, end - self.port.now()))
                 answer: Status | None = self._status
                 if answer is not None and answer.tag in tags and answer.page == page:
-                    self.line.resent += tags.index(answer.tag)  # answers keep order: those before were lost
+                    # answers keep their order, so the earlier ones were lost
+                    self.line.resent += tags.index(answer.tag)
                     return answer
         raise _silence_error(self.port)
 
@@ -255,7 +256,7 @@ class Session:
             self._hear(0.03)
 
     def wait_for_rest(self) -> Status:
-        """Wait until the arm stands, whatever the session is; its status then."""
+        """Wait until the arm is at rest, in any session, and return its status."""
         self._until = self.port.now() + _HOLD_TIMEOUT
         while True:
             status = self.status()
@@ -267,33 +268,33 @@ class Session:
             self._hear(_QUICK_POLL_PERIOD)
 
     def arrivals(self, seconds: float = 0.0) -> Iterator[float]:
-        """Wait until all that was submitted is done and the arm stands; yields the seconds left.
+        """Wait until all submitted motion is done and the arm is at rest; yields the seconds left.
 
-        seconds: that a motion may take which is not queued: homing.
+        seconds: duration of a motion that is not in the queue, such as homing.
         """
         self._until = max(self._until, self.port.now() + self.queued / 1000 + seconds + _STALL_TIMEOUT)
         while True:
             self._check_stalled()
             if not self._window and self.state == State.IDLE:
                 return
-            left = self.queued - 1000 * (self.port.now() - self.heard)  # what is queued goes on unheard
-            self.pump(ends=not self._window and left < _END_MILLISECONDS)
+            queue_left = self.queued - 1000 * (self.port.now() - self.heard)  # the queue empties between two replies
+            self.pump(ends=not self._window and queue_left < _END_MILLISECONDS)
             yield self.under_way + self.queued / 1000
 
 
 def _between_questions(line: Line, window: Window, ends: bool) -> float:
-    """Seconds from one question for the status to the next; ends: the queue does."""
-    if line.unanswered > _MAX_UNANSWERED:  # more questions would fill the line, and be lost in front of the board
+    """The time [s] between two status requests; ends: whether the queue ends soon."""
+    if line.unanswered > _MAX_UNANSWERED:  # more requests would fill the line and be lost
         return _POLL_PERIOD
-    # There is room for one question beside the frames; on a bad line the one before may be lost.
+    # One request fits beside the frames; on a bad line the last one may be lost.
     late = window.late and (line.damaged or not line.unanswered)
-    often = _NOISY_POLL_PERIOD if line.damaged else _POLL_PERIOD
-    quick = _QUICK_POLL_PERIOD if ends or window.out_of_credit or late else often
-    return quick / 2 if line.noisy else quick
+    normal = _NOISY_POLL_PERIOD if line.damaged else _POLL_PERIOD
+    period = _QUICK_POLL_PERIOD if ends or window.out_of_credit or late else normal
+    return period / 2 if line.noisy else period
 
 
 def probe_line(session: Session) -> None:
-    """Ask a few questions, to learn whether the line is good before anything depends on it."""
+    """Send a few status requests to measure the quality of the line before a motion."""
     for _ in range(_PROBE_COUNT):
         if session.status().bad:
             session.line.resent += 1
@@ -305,7 +306,7 @@ def _new_nonce() -> int:
 
 
 def _has_moved(last_status: Status | None, reply: Ack | Status) -> bool:
-    """Whether a status tells other counts than the one before."""
+    """Whether the counts of a status differ from the last one."""
     return (
         isinstance(reply, Status) and last_status is not None and reply.page == 0 and reply.counts != last_status.counts
     )
@@ -319,15 +320,15 @@ def _silence_error(port: Port) -> LinkError:
 
 
 def _no_board(port: Port, heard: bytes, damaged: bool) -> LinkError:
-    """What to say of a port where this protocol is not spoken.
+    """The error of a port without a board that speaks this protocol.
 
-    heard: what came between two tries; damaged: whether something came that is no frame of the protocol.
+    heard: bytes received between two tries; damaged: whether damaged frames were received.
     """
     port_text = f"{port.name} ({port.baud} baud)"
     if b"grbl" in heard.lower():
-        why = f"GRBL answers on {port_text}: its robot file says board: {{kind: grbl}}"
+        text = f"GRBL answers on {port_text}: its robot file says board: {{kind: grbl}}"
     elif heard or damaged:
-        why = f"something answers on {port_text}, but not in this protocol: is armkin's firmware flashed?"
+        text = f"something answers on {port_text}, but not in this protocol: is armkin's firmware flashed?"
     else:
-        why = f"no board answers on {port_text}: is armkin's firmware flashed?"
-    return LinkError(f"{why}\n(armkin flash); armkin ports lists the other ports")
+        text = f"no board answers on {port_text}: is armkin's firmware flashed?"
+    return LinkError(f"{text}\n(armkin flash); armkin ports lists the other ports")
