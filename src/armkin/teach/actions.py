@@ -22,25 +22,25 @@ if TYPE_CHECKING:
 
 
 class Actions:
-    """The actions of one run of `armkin teach`, and what its pages share: the arm, its pose, who holds control."""
+    """The actions of one run of `armkin teach`, and the state that its pages share: arm, pose, program and control."""
 
     def __init__(
         self, arm: Arm, port: str | None = None, baud: int | None = None, meshes: dict[str, Any] | None = None
     ) -> None:
         """port: of a board, as `armkin send` takes it; meshes: see `armkin.teach.urdf_meshes.meshes_json`.
 
-        Raises UsageError if the robot file says too little for the board.
+        Raises UsageError if the robot file lacks keys for the board.
         """
         self.arm, self.meshes = arm, meshes
         self.board: BoardActions | None = None
         self.tabs = Tabs(self._abandoned)
-        self._solving = threading.Lock()  # one question at a time: two cores are not many
+        self._solving = threading.Lock()  # solve one question at a time, to leave a core for other work
         self._last_answer: dict[str, Any] = {}
         self._quick: QuickIk | None = None
         self.program_actions = ProgramActions(
             arm, self.standing_pulses, lambda state: self.tabs.publish("program", state)
         )
-        # actions by name; whoever holds the key may stop the arm
+        # actions by name that need no control: every page may stop the arm
         self.for_everyone: dict[str, Callable[[], dict[str, Any]]] = {
             "open": self._open,
             "solver": self._solver,
@@ -57,12 +57,12 @@ class Actions:
             self.for_control |= self.board.actions()
 
     def close(self) -> None:
-        """Stop the arm, give the port back."""
+        """Stop the arm, and close the port."""
         if self.board is not None:
             self.board.thread.close()
 
     def act(self, name: str, tab_id: str, fields: Fields) -> dict[str, Any]:
-        """Carry out an action for a page. Raises RefusedError, or an ArmkinError that says what is wrong."""
+        """Carry out an action for a page. Raises RefusedError, or an ArmkinError for an invalid one."""
         if name in self.for_everyone:
             return self.for_everyone[name]()
         tab = self.tabs.find(tab_id)
@@ -95,7 +95,7 @@ class Actions:
         return {}
 
     def warm(self) -> None:
-        """Have the first page's answer ready, while its browser still loads the files."""
+        """Prepare the first page's answer while its browser loads the files."""
         from armkin.teach.pose_answers import Question, answer_question
 
         with self._solving:
@@ -109,41 +109,41 @@ class Actions:
         tab = self.tabs.open()
         self.warm()
         board = None if self.board is None else self.board.thread.state()
-        moved = [] if self.board is None else tip_jog_axes(self.arm)
+        jog_axes = [] if self.board is None else tip_jog_axes(self.arm)
         return {
             "tab": tab.id,
-            "scene": scene_json(self.arm) | {"meshes": self.meshes, "jogs": moved},
+            "scene": scene_json(self.arm) | {"meshes": self.meshes, "jogs": jog_axes},
             "look": self._last_answer,
             "program": self.program_actions.program.state(),
             "board": board,
         }
 
     def _look(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Where a pose or a target is, with all branches; the other pages see it, too.
+        """Answer a pose or a target with all branches, and show it on the other pages.
 
-        `goal`: a person drags or types it: an arm that follows goes there. Any other new pose ends following: a drag
-        from there would take the arm along to what nobody dragged.
+        `goal`: the user drags or types it, so a following arm goes there. Any other new pose ends following, since the
+        next drag would otherwise move the arm to a pose that nobody dragged.
         """
-        from armkin.teach.pose_answers import answer_question  # the solver: imported while the browser loads the page
+        from armkin.teach.pose_answers import answer_question  # imported late, while the browser loads the page
         from armkin.teach.quick_ik import QuickIk
 
         question = self._question(fields)
         with self._solving:
             self._quick = self._quick or QuickIk()
             answer = answer_question(self.arm, question, self._quick)
-        before, self._last_answer = self._last_answer, answer
+        last_answer, self._last_answer = self._last_answer, answer
         self.tabs.publish("look", answer, except_tab=tab)
         if self.board is None:
             return answer
         if request_checks.flag_field(fields, "goal"):
             if not answer["outside"]:
                 self.board.follow_pose(tab, units.joints_in(self.arm, answer["q"]))
-        elif not before or answer["q"] != before["q"]:
+        elif not last_answer or answer["q"] != last_answer["q"]:
             self.board.end_follow()
         return answer
 
     def _question(self, fields: Fields) -> Question:
-        """What a page asks. Raises UsageError for what is no question."""
+        """The question in a page's fields. Raises UsageError for invalid fields."""
         from armkin.teach.pose_answers import Question
 
         arm = self.arm
@@ -166,7 +166,7 @@ class Actions:
         )
 
     def standing_pulses(self) -> tuple[int, ...] | None:
-        """Pulses where the arm stands; None if nothing is known of it."""
+        """Pulses of the arm's position; None if unknown."""
         return None if self.board is None else self.board.thread.standing_pulses()
 
     def _abandoned(self) -> None:

@@ -1,4 +1,4 @@
-"""What the page must know of an arm to draw it and to label its inputs; lengths in mm, angles in degrees."""
+"""The description of an arm for the page, to draw it and to label its inputs; lengths in mm, angles in degrees."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _joints_json(arm: Arm, offsets: Array) -> list[dict[str, Any]]:
 
 
 def first_lock(arm: Arm) -> str | None:
-    """The joint that is held when the page opens: the redundant one; where several must be, one in the middle."""
+    """The joint that is held when the page opens: the redundant one, or a middle one if several must be held."""
     try:
         task_for(arm)
     except UsageError:
@@ -69,7 +69,7 @@ def first_lock(arm: Arm) -> str | None:
 
 
 def _joint_steps(arm: Arm) -> list[float]:
-    """What each joint resolves [deg | mm]: the most that a pulse turns it; 0.1 where there are no drives."""
+    """The resolution of each joint [deg | mm]: its largest motion by one pulse; 0.1 without drives."""
     try:
         per_pulse = np.abs(joints_per_pulse(arm)).max(axis=1)
     except UsageError:
@@ -88,7 +88,7 @@ def _obstacle_triangles(arm: Arm) -> list[float]:
 
 
 def tip_jog_axes(arm: Arm) -> list[str]:
-    """The axes that the tip may be jogged along: none where no task fits."""
+    """The axes along which the tip may be jogged; none if no task fits."""
     from armkin.motion.path_planner.jog_line import jog_axes
 
     try:
@@ -103,8 +103,8 @@ def _motors_json(arm: Arm) -> dict[str, Any]:
         joints_per_pulse(arm)
     except UsageError as error:
         return {"motors": None, "no_motors": str(error)}
-    named = zip(motor_names(arm), pulse_units(arm), strict=True)
-    return {"motors": [{"name": name, "unit": unit} for name, unit in named], "no_motors": ""}
+    motors = zip(motor_names(arm), pulse_units(arm), strict=True)
+    return {"motors": [{"name": name, "unit": unit} for name, unit in motors], "no_motors": ""}
 
 
 def _gripper_json(arm: Arm) -> dict[str, Any] | None:
@@ -112,14 +112,14 @@ def _gripper_json(arm: Arm) -> dict[str, Any] | None:
     file = arm.gripper
     if file is None:
         return None
-    # It continues the last straight piece of the arm, which is not always along the tool's z axis.
+    # The gripper continues the last straight piece of the arm, which is not always along the tool's z axis.
     corners = arm_shape(arm).bodies[-1]
     pieces = [d for d in np.diff(corners, axis=0) if np.linalg.norm(d) > 1e-6 * arm.reach]
-    way = pieces[-1] if pieces else np.array([0.0, 0.0, 1.0])
-    inside = arm.link[-1][:3, :3].T @ way
+    piece = pieces[-1] if pieces else np.array([0.0, 0.0, 1.0])
+    direction = arm.link[-1][:3, :3].T @ piece
     return {
         "open": file.open,
         "closed": file.closed,
         "unit": "deg" if file.lead is None else "mm",
-        "along": (inside / np.linalg.norm(inside)).tolist(),
+        "along": (direction / np.linalg.norm(direction)).tolist(),
     }

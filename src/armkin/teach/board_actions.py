@@ -1,4 +1,4 @@
-"""What a page may have the board do: send a pose, home, jog, grip, follow; each is refused unless it is safe."""
+"""The actions of a page on the board: send a pose, home, jog, grip, follow; each is refused unless it is safe."""
 
 from __future__ import annotations
 
@@ -29,25 +29,25 @@ if TYPE_CHECKING:
     from armkin.teach.board_thread import BoardThread, Job
     from armkin.teach.tabs import Action, Fields, Tab
 
-DEAD_MAN = 0.3  # time [s] that a jog goes on after the page was last heard of
+DEAD_MAN = 0.3  # time [s] of a jog after the last request of its page
 FOLLOW_SPEED = 0.15  # share of every joint's max_speed
-FOLLOW_HOP = 5.0  # way [deg | 2 mm] of the fastest joint after which the arm stops and looks for its goal again
-_LONGEST_JOG = 60.0  # length [s], at most, of a jog
+FOLLOW_HOP = 5.0  # longest move [deg | 2 mm] of the fastest joint until the arm looks for a new goal
+_LONGEST_JOG = 60.0  # longest jog [s]
 
 
 class BoardActions:
-    """The actions on a board, and how each is carried out."""
+    """The actions on a board, as jobs for its thread."""
 
     def __init__(self, thread: BoardThread, program: Callable[[Array, float], PathPlan]) -> None:
         """program: the motion of the page's program from joint values (n,) [rad | mm], at a fraction of its speed."""
         self.thread, self.arm, self.program = thread, thread.arm, program
-        self._alive = 0.0  # time until which a jog goes on
+        self._alive = 0.0  # time at which a jog ends
         self._goal: Array | None = None
         self._lock = threading.Lock()
 
     def actions(self) -> dict[str, Action]:
-        """Name -> action, for the page in control. Each but `follow` ends following, also where it is refused."""
-        stopping = {
+        """{name: action} for the page in control. Each except `follow` ends following, even if it is refused."""
+        others = {
             "connect": self.connect,
             "send": self.send,
             "run": self.run_program,
@@ -58,7 +58,7 @@ class BoardActions:
             "jog_end": self.jog_end,
             "grip": self.grip,
         }
-        return {"follow": self.follow, **{name: self._ending_follow(action) for name, action in stopping.items()}}
+        return {"follow": self.follow, **{name: self._ending_follow(action) for name, action in others.items()}}
 
     def _ending_follow(self, action: Action) -> Action:
         def act(tab: Tab, fields: Fields) -> dict[str, Any]:
@@ -68,13 +68,13 @@ class BoardActions:
         return act
 
     def stop(self) -> None:
-        """STOP: follows no more, and holds the arm."""
+        """STOP: hold the arm and end following."""
         self._alive = 0.0
         self.thread.stop()
         self.end_follow()
 
     def abandoned(self) -> None:
-        """The page in control is gone."""
+        """End all motion after the page in control was closed."""
         self._alive = 0.0
         self.thread.abandoned()
         self.end_follow()
@@ -95,14 +95,14 @@ class BoardActions:
         return {}
 
     def run_program(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Carry out the page's program from where the arm stands."""
+        """Carry out the page's program from the arm's position."""
         speed = request_checks.number_field(fields, "speed", 1, 100) / 100
         self.check_file()
         self.thread.submit("run", lambda machine: self._run_program(machine, speed))
         return {}
 
     def assume_home(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Take the operator's word that the arm stands in its home pose."""
+        """Accept the operator's statement that the arm stands in its home pose."""
         if not request_checks.flag_field(fields, "consent"):
             raise UsageError("say first that the arm stands in its home pose")
         self.check_file()
@@ -122,10 +122,10 @@ class BoardActions:
         return {}
 
     def jog(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """A button was pressed: turn a joint, or move the tip along an axis, while `jog_on` comes in time.
+        """Begin a jog of a joint, or of the tip along an axis, that lasts while `jog_on` arrives in time.
 
-        One press begins one jog: neither a sign of life that is late nor a request that is overtaken by the button's
-        release moves the arm.
+        Each press of a button begins at most one jog, so that a late `jog_on`, or a request that arrives after the
+        release, does not move the arm.
         """
         press = _press_number(fields)
         percent = request_checks.number_field(fields, "percent", -100, 100)
@@ -133,7 +133,7 @@ class BoardActions:
             raise UsageError("percent: 0 is no jog")
         job = self._jog_of(fields, percent)
         self.check_file()
-        with self._lock:  # the job asks how long it goes on as soon as it is submitted
+        with self._lock:  # the job reads its deadline as soon as it is submitted
             if press > tab.press:
                 tab.press = press
                 self.thread.submit("jog", job)
@@ -141,7 +141,7 @@ class BoardActions:
         return {}
 
     def _jog_of(self, fields: Fields, percent: float) -> Job:
-        """The job that jogs what is asked for."""
+        """The job that jogs the joint or the tip in the fields."""
         if "axis" not in fields:
             joint = request_checks.index_field(fields, "joint", self.arm.n)
             return lambda machine: self._jog(machine, joint, percent)
@@ -154,7 +154,7 @@ class BoardActions:
         return lambda machine: self._jog_tip(machine, axis, tool, percent / 100)
 
     def jog_on(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The button is still held. Where the last sign of life was too long ago, its jog is over."""
+        """Extend the jog of a held button, unless its deadline has passed."""
         press = _press_number(fields)
         with self._lock:
             now = time.monotonic()
@@ -163,7 +163,7 @@ class BoardActions:
         return {}
 
     def jog_end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The button was let go; what comes later of that press moves nothing."""
+        """End the jog of a released button, and ignore later requests of that press."""
         press = _press_number(fields)
         with self._lock:
             tab.press = max(tab.press, press)
@@ -171,7 +171,7 @@ class BoardActions:
         return {}
 
     def grip(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Open or close the gripper, or take a value; `assume`: it stands open now, if nothing is known of it."""
+        """Open or close the gripper, or move it to a value; `assume`: take a lost gripper to be open."""
         value = fields.get("value")
         if isinstance(value, str) and value not in ("open", "closed"):
             raise UsageError("value: expected open, closed or a number")
@@ -184,7 +184,7 @@ class BoardActions:
         return {}
 
     def follow(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Let the arm follow what is dragged or typed in this page, slowly; off at every start."""
+        """Let the arm slowly follow poses that are dragged or typed in this page; off at every start."""
         follows = request_checks.flag_field(fields, "on")
         if follows and self.thread.standing_pulses() is None:
             raise LinkError("the arm's position is not known: it does not follow from there")
@@ -193,12 +193,12 @@ class BoardActions:
         return {"on": follows}
 
     def end_follow(self) -> None:
-        """The arm follows no page; a hop that is under way ends where it was to end."""
+        """End following; a move in progress is completed."""
         self._goal = None
         self.thread.set_follower("")
 
     def follow_pose(self, tab: Tab, q: Array) -> None:
-        """A person has dragged or typed a pose within the limits: where the arm goes if it follows that page."""
+        """Set the goal of a following arm to a pose within limits that was dragged or typed in its page."""
         with self._lock:
             if self.thread.follower != tab.id:
                 return
@@ -206,11 +206,11 @@ class BoardActions:
             if self.thread.doing:
                 return
             self.check_file()
-            with suppress(RefusedError):  # busy with something else since
+            with suppress(RefusedError):  # another job has begun since
                 self.thread.submit("follow", self._follow)
 
     def check_file(self) -> None:
-        """Raise FileError if the robot file is not the one that the page was made of."""
+        """Raise FileError if the robot file has changed since the page was made."""
         if not self.arm.path:
             return
         try:
@@ -228,7 +228,7 @@ class BoardActions:
         machine.run([plan], self._report_progress)
 
     def _run_program(self, machine: Backend, speed: float) -> None:
-        """Every part is planned and laid out before the first one moves: the gripper's moves stand between them."""
+        """Plan and check all parts before the first one moves, and run them with the gripper moves between."""
         _prepare_motors(machine)
         plan = self.program(machine.joints(), speed)
         path_run.check_gripper(plan, self.thread.board)
@@ -246,34 +246,34 @@ class BoardActions:
         board.jog(joint, rate, _LONGEST_JOG, self._held_down)
 
     def _jog_tip(self, machine: Backend, axis: str, frame: Frame, share: float) -> None:
-        """Line after line along an axis; each is planned to its rest, and held on its way when nobody asks for it."""
+        """Move along lines of an axis, each planned to a rest, and hold the arm when the button is released."""
         from armkin.motion.path_planner.jog_line import jog_line
 
         _prepare_motors(machine)
-        why = ""
-        while not why and self._held_down():
-            plan, why = jog_line(self.arm, machine.joints(), axis, frame, share)
+        end_text = ""
+        while not end_text and self._held_down():
+            plan, end_text = jog_line(self.arm, machine.joints(), axis, frame, share)
             parts = path_run.lay_parts(plan, machine.counts(), self.thread.board.lay)
             with self.thread.held_motion(lambda: not self._held_down()):
                 self._carry_out(plan, parts)
-        if why and self._held_down():
-            raise NoSolutionError(f"the jog ends: {why}")
+        if end_text and self._held_down():
+            raise NoSolutionError(f"the jog ends: {end_text}")
 
     def _held_down(self) -> bool:
-        """Whether the page was heard of lately: its button is held."""
+        """Whether the jog's deadline has not passed, so its button counts as held."""
         with self._lock:
             return time.monotonic() < self._alive
 
     def _follow(self, machine: Backend) -> None:
-        """Hop after hop towards the newest goal: none is so long that the goal is far when it ends."""
+        """Move in short steps towards the newest goal, so that each step ends near the present goal."""
         scale = np.where(self.arm.prismatic, 0.5, 180 / np.pi) / FOLLOW_HOP
         try:
             while (goal := self._goal) is not None and self.thread.follower:
-                standing = machine.joints()
-                far = float((np.abs(goal - standing) * scale).max())
-                self.run(machine, (standing + (goal - standing) / max(far, 1.0))[None], FOLLOW_SPEED)
+                present = machine.joints()
+                steps = float((np.abs(goal - present) * scale).max())
+                self.run(machine, (present + (goal - present) / max(steps, 1.0))[None], FOLLOW_SPEED)
                 with self._lock:
-                    if far <= 1.0 and goal is self._goal:
+                    if steps <= 1.0 and goal is self._goal:
                         self._goal = None
         except ArmkinError:
             self.end_follow()
@@ -284,19 +284,19 @@ class BoardActions:
 
 
 def _press_number(fields: Fields) -> int:
-    """Which press of a jog's button, counted by the page."""
+    """The number of the press of a jog's button, as counted by the page."""
     return request_checks.index_field(fields, "press", 2**31)
 
 
 def _prepare_motors(machine: Backend) -> None:
-    """Switch the motors on; LinkError if the position is lost."""
+    """Switch the motors on. Raises LinkError if the position is lost."""
     if machine.position() == "lost" and not machine.port.simulated:
         raise LinkError("the arm's position is lost: home it, or put it in its home pose and say so; it was not moved")
     machine.prepare()
 
 
 def _move_gripper(board: Board, value: str | float, assume: bool) -> None:
-    """Move the gripper; assume: it stands open now, if nothing is known of it."""
+    """Move the gripper; assume: take a lost gripper to be open."""
     is_known = board.grip_known()
     if not is_known and not assume:
         raise LinkError(

@@ -1,8 +1,7 @@
-"""The board behind the page: one thread owns the port, carries out one job at a time, and listens to STOP always.
+"""The board behind the page: one thread owns the port, carries out one job at a time, and always obeys STOP.
 
-A job never starts by itself, and nothing waits in line behind another: what is asked while the arm moves is
-refused. STOP does not pass through here as a job: it is asked for at every turn of the session, 200 times a
-second, and answered with a hold.
+Jobs never start by themselves and are not queued: a request while the arm moves is refused. STOP is no job. The session
+checks for it at every turn, 200 times a second, and holds the arm.
 """
 
 from __future__ import annotations
@@ -29,43 +28,43 @@ if TYPE_CHECKING:
 
 Job = Callable[[Backend], None]
 
-_POLL_PERIOD = 0.25  # time [s] between two looks at a board that stands
-_TELL_PERIOD = 0.08  # time [s] between two positions of an arm that moves: what a page can draw
+_POLL_PERIOD = 0.25  # time [s] between two status requests at rest
+_TELL_PERIOD = 0.08  # time [s] between two positions during motion, as fast as a page draws
 
 
 class BoardThread:
-    """The thread that owns the port of an arm's board; `publish` gets its state whenever that changes."""
+    """The thread that owns the port of an arm's board, and calls `publish` with its state on every change."""
 
     def __init__(self, arm: Arm, port: str, baud: int | None, publish: Callable[[dict[str, Any]], None]) -> None:
-        """Raises UsageError if the robot file does not say what the board must know."""
+        """Raises UsageError if the robot file lacks keys for the board."""
         self.arm, self.port = arm, port
         self.baud, self.publish = baud, publish
         self.board = board_of(arm, rehearsal=port == SIM)
         self.link: Port | None = None
         self.machine: Backend | None = None
-        self.progress = (0.0, 0.0)  # seconds of the job's motion, and of all of it
-        self.progress_seconds = 0.0  # seconds that are not rounded
-        self.parts: list[Trajectory] = []  # trajectories of the motion, one after another; empty where it has no plan
+        self.progress = (0.0, 0.0)  # seconds done of the job's motion, and in all
+        self.progress_seconds = 0.0  # seconds done, not rounded
+        self.parts: list[Trajectory] = []  # trajectories of the motion in order; empty without a plan
         self.follower = ""  # id of the page that the arm follows; empty: none
         self._lock = threading.Lock()
         self._wake = threading.Event()
         self._stop = threading.Event()
         self._ended = False
-        self._let_go: Callable[[], bool] = lambda: False  # whether a held button is held no more
+        self._let_go: Callable[[], bool] = lambda: False  # whether the held button was released
         self._job: tuple[str, Job] | None = ("connect", lambda machine: None)
         self._doing = "connect"  # name of the job, "" if there is none
         self._error = ""
-        self._ended_jobs = (0, "")  # how many, and the last one's name: a page may miss how a short one began
+        self._ended_jobs = (0, "")  # number of ended jobs and name of the last, as a page may miss a short job
         self._published: dict[str, Any] = {}
         self._told_at = 0.0
         self._telling = threading.Lock()
         self._thread = threading.Thread(target=self._run_jobs, name="board")
         self._thread.start()
 
-    # What pages ask for, in threads of theirs
+    # Methods for the threads of pages
 
     def submit(self, name: str, job: Job) -> None:
-        """Have a job carried out at once. Raises RefusedError while another one is."""
+        """Start a job at once. Raises RefusedError while another one runs."""
         with self._lock:
             if self._doing or self._stop.is_set():
                 raise RefusedError(409, f"the arm is busy ({self._doing or 'stop'}): wait for it, or STOP")
@@ -80,20 +79,20 @@ class BoardThread:
         self._wake.set()
 
     def set_follower(self, tab: str) -> None:
-        """The arm follows that page, or none; all pages are told."""
+        """Set the page that the arm follows, or none, and publish it."""
         with self._telling:
-            before, self.follower = self.follower, tab
-            if tab != before and self._published:
+            last_follower, self.follower = self.follower, tab
+            if tab != last_follower and self._published:
                 self._published = {**self._published, "follows": bool(tab)}
                 self.publish(self._published)
 
     def abandoned(self) -> None:
-        """The page that held control is gone: what it has started ends."""
+        """Stop the motion of a page in control that was closed."""
         if self._doing not in ("", "connect"):
             self.stop()
 
     def close(self) -> None:
-        """Stop what moves, and give the port back."""
+        """Stop the arm, and close the port."""
         self._ended = True
         if self._doing:
             self._stop.set()
@@ -102,20 +101,20 @@ class BoardThread:
 
     @property
     def doing(self) -> str:
-        """Name of the job that is carried out; empty if there is none and the pages know how the last one ended."""
+        """Name of the running job; empty if there is none and the end of the last one was published."""
         return self._doing or str(self._published.get("doing", ""))
 
     @property
     def stopping(self) -> bool:
-        """Whether a STOP has not come to its end."""
+        """Whether a STOP is in progress."""
         return self._stop.is_set()
 
     def state(self) -> dict[str, Any]:
-        """JSON: what the pages are told."""
+        """The published state, as JSON."""
         return self._published or self._state_json()
 
     def standing_pulses(self) -> tuple[int, ...] | None:
-        """Pulses where the arm stands; None if that is not known."""
+        """Pulses of the arm's position; None if unknown."""
         counts = self.state()["pulses"]
         return None if counts is None else tuple(counts)
 
@@ -149,7 +148,7 @@ class BoardThread:
             if self.machine is None or not self._board_answers(self.machine):
                 self._disconnect()
         except Exception as error:
-            # Whatever went wrong, the arm must not go on with it.
+            # The arm must not move on after an unexpected error.
             self._error = f"internal error: {error!r}: this is a bug in armkin"
             self._stop.set()
             self._wake.set()
@@ -157,8 +156,8 @@ class BoardThread:
         self._publish()
 
     def _open(self) -> Backend:
-        """The machine; our firmware's in a new session: what ended the last one is over."""
-        first = self.machine is None
+        """The machine, connected at first and with a new job begun later."""
+        is_first = self.machine is None
         if self.link is None:
             port = self.board.open(self.port, self.baud)
             self.link = Paced(port) if port.simulated else port
@@ -167,12 +166,12 @@ class BoardThread:
         else:
             self.board.begin_job()
             self.machine = self.board.machine
-        if first and self.link.simulated:
-            self.machine.prepare()  # a board in this process starts with the arm at home
+        if is_first and self.link.simulated:
+            self.machine.prepare()  # the arm on a simulated board starts at home
         return self.machine
 
     def _watch(self) -> bool:
-        """Asked at every turn of a session: tell where the pins are now, and whether to stop."""
+        """Called at every turn of a session: publish the position, and return whether to stop."""
         if self.machine is not None and time.monotonic() - self._told_at >= _TELL_PERIOD:
             self.board.heard()
             self._publish()
@@ -180,7 +179,7 @@ class BoardThread:
 
     @contextmanager
     def held_motion(self, let_go: Callable[[], bool]) -> Iterator[None]:
-        """A motion that a button holds: it ends on its path, as by STOP and as no error, when that is let go."""
+        """Run a motion that is held on its path, without an error, when `let_go` returns True."""
         self._let_go = let_go
         try:
             yield
@@ -192,7 +191,7 @@ class BoardThread:
             self._let_go = lambda: False
 
     def _hold(self) -> None:
-        """STOP while no job was carried out: the board is held all the same."""
+        """Hold the board after a STOP without a running job."""
         with self._lock:
             self._job, self._doing = None, ""
         if self.machine is not None:
@@ -232,7 +231,7 @@ class BoardThread:
         self.set_follower("")
 
     def _state_json(self) -> dict[str, Any]:
-        """What pages are told of the board: its state, times [s], and where its arm stands [counts, deg | mm]."""
+        """The state for the pages: board, times [s], and the arm's position [counts, deg | mm]."""
         machine = self.machine
         state: dict[str, Any] = {
             "port": self.port,
@@ -258,12 +257,12 @@ class BoardThread:
         return state
 
     def _planned_joints(self) -> list[float] | None:
-        """Where the plan has the arm now [deg | mm]; None while no planned motion is under way."""
-        left = self.progress_seconds
+        """Joint values of the plan at this moment [deg | mm]; None without a planned motion."""
+        seconds = self.progress_seconds
         for part in self.parts if self._doing else ():
-            if left <= part.duration or part is self.parts[-1]:
-                return [float(x) for x in units.joints_out(self.arm, part.q(min(left, part.duration)))]
-            left -= part.duration
+            if seconds <= part.duration or part is self.parts[-1]:
+                return [float(x) for x in units.joints_out(self.arm, part.q(min(seconds, part.duration)))]
+            seconds -= part.duration
         return None
 
     def _publish(self) -> None:

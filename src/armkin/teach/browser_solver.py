@@ -1,4 +1,4 @@
-"""The arm's solver for the browser itself: its module, and the words that go with it."""
+"""The arm's solver as a JavaScript module for the browser, and the labels that belong to it."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ if TYPE_CHECKING:
 
 
 def solver_json(arm: Arm, task_name: str | None = None) -> dict[str, Any]:
-    """What a page must know of the module: the task, its numbers' names and units, how far the motors go."""
-    spare = redundancy(actual_arm(arm), task_name)
-    task = spare.task if spare else solver(actual_arm(arm), task_name)[0]
+    """The data of a page about the module: the task, names and units of its numbers, ranges of the motors."""
+    redundant = redundancy(actual_arm(arm), task_name)
+    task = redundant.task if redundant else solver(actual_arm(arm), task_name)[0]
     return {
         "robot": Path(arm.path).stem if arm.path else arm.name,
         "task": task.name,
         "labels": list(task.labels),
         "units": label_units(task.labels),
-        "held": arm.joint_names[spare.joint] if spare else "",
+        "held": arm.joint_names[redundant.joint] if redundant else "",
         "pulse_range": [[units.finite_or_none(end) for end in pair] for pair in pulse_range(arm).tolist()],
     }
 
 
 def solver_fields(arm: Arm) -> dict[str, Any]:
-    """The module's text and `about`; none where the arm has no module."""
-    from armkin.export.js.es_module import module_text  # only pages that are open need it
+    """The module's text and its `about` data; None for both if the arm has no module."""
+    from armkin.export.js.es_module import module_text  # imported late, as only open pages need it
 
     try:
         return {"module": module_text(arm), "about": solver_json(arm)}

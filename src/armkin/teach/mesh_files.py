@@ -1,6 +1,6 @@
-"""Files of triangles: STL in both its forms, and the triangles and polygons of a Collada file (.dae).
+"""Reads triangles from mesh files: STL in both forms, and triangles and polygons of Collada (.dae).
 
-Collada: https://www.khronos.org/files/collada_spec_1_4.pdf; `up_axis` is left out of account, as RViz does.
+Collada: https://www.khronos.org/files/collada_spec_1_4.pdf; `up_axis` is ignored, as in RViz.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from armkin.errors import MissingExtraError, UsageError
 from armkin.formula.arrays import Array
 
-MAX_BYTES = 64 * 2**20  # size [bytes], at most, of one file
+MAX_BYTES = 64 * 2**20  # largest file [bytes]
 _VERTEX = re.compile(rb"vertex\s+(\S+)\s+(\S+)\s+(\S+)")
-_MAX_DEPTH = 40  # nodes within nodes, at most
+_MAX_DEPTH = 40  # deepest nesting of nodes
 _Index = NDArray[np.int64]
 
 
@@ -61,7 +61,7 @@ def _parse_collada(raw: bytes) -> Array:
         ) from None
     try:
         root = fromstring(raw, forbid_dtd=True)
-    except SyntaxError as error:  # what ElementTree's ParseError is
+    except SyntaxError as error:  # the base class of ElementTree's ParseError
         raise ValueError(f"no XML: {error}") from None
     for element in root.iter():
         element.tag = str(element.tag).rpartition("}")[2]
@@ -83,16 +83,16 @@ def _parse_collada(raw: bytes) -> Array:
 def _node_triangles(
     node: Any, T: Array, shapes: dict[Any, list[Array]], nodes: dict[Any, Any], depth: int
 ) -> Iterator[Array]:
-    """The triangles of a node and of those within it."""
+    """The triangles of a node and of the nodes in it."""
     if depth > _MAX_DEPTH:
         raise ValueError(f"nodes nested deeper than {_MAX_DEPTH}")
     for element in node:
         T = T @ _transformation(element.tag, [float(x) for x in (element.text or "").split()]) if element.text else T
-    for used in node.findall("instance_geometry"):
-        for corners in shapes.get(used.get("url", "").removeprefix("#"), []):
+    for instances in node.findall("instance_geometry"):
+        for corners in shapes.get(instances.get("url", "").removeprefix("#"), []):
             yield corners @ T[:3, :3].T + T[:3, 3]
-    used = [nodes[instance.get("url", "").removeprefix("#")] for instance in node.findall("instance_node")]
-    for child in [*node.findall("node"), *used]:
+    instances = [nodes[instance.get("url", "").removeprefix("#")] for instance in node.findall("instance_node")]
+    for child in [*node.findall("node"), *instances]:
         yield from _node_triangles(child, T, shapes, nodes, depth + 1)
 
 
@@ -106,14 +106,14 @@ def _transformation(tag: str, values: list[float]) -> Array:
         T[:3, :3] = np.diag(values)
     elif tag == "rotate":
         x, y, z = np.array(values[:3]) / np.linalg.norm(values[:3])
-        across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        turn = math.radians(values[3])
-        T[:3, :3] += math.sin(turn) * across + (1 - math.cos(turn)) * across @ across
+        K = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = math.radians(values[3])
+        T[:3, :3] += math.sin(angle) * K + (1 - math.cos(angle)) * K @ K
     return T
 
 
 def _geometry_triangles(mesh: Any) -> Iterator[Array]:
-    """The triangles of a geometry's triangles, polylists and polygons: polygons are taken to be convex."""
+    """The triangles of a geometry, from its triangles, polylists and polygons, which are assumed to be convex."""
     sources = dict(_source_arrays(mesh))
     vertices = {one.get("id"): one for one in mesh.findall("vertices")}
     for kind, index_of in _INDEX_OF.items():
@@ -133,7 +133,7 @@ def _geometry_triangles(mesh: Any) -> Iterator[Array]:
 
 
 def _input_of(inputs: list[Any], semantic: str) -> Any:
-    """The only one of inputs that means this."""
+    """The only input with this semantic."""
     [match] = [source for source in inputs if source.get("semantic") == semantic]
     return match
 

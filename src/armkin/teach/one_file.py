@@ -1,4 +1,4 @@
-"""The page as one HTML file that asks no server: its modules inlined, the arm's own solver in place of the server."""
+"""The page as one HTML file without a server: its modules are inlined, and the arm's own solver answers."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ def arm_html(
 
 
 def _strip_comments(text: str) -> str:
-    """A module without its whole-line comments and indentation; no string of ours goes on over lines."""
+    """A module without whole-line comments and indentation, which is safe as no string spans lines."""
     text = re.sub(r"^[ \t]*/\*\*(?:(?!\*/).)*\*/[ \t]*$", "", text, flags=re.DOTALL | re.MULTILINE)
     lines = (line.strip() for line in text.splitlines())
     return "\n".join(line for line in lines if line and not line.startswith("//"))
 
 
 def _by_name(text: str, name: str) -> str:
-    """A module's imports by the names of the import map: a `data:` URL has no place that others stand beside."""
+    """Replace a module's relative imports by names of the import map, since a `data:` URL has no folder."""
     folder = Path("/") / Path(name).parent
 
     def map_import(match: re.Match[str]) -> str:
@@ -74,7 +74,7 @@ def _by_name(text: str, name: str) -> str:
 
 
 def _data_url(text: str) -> str:
-    """A module as a `data:` URL: only what would end it is escaped."""
+    """A module as a `data:` URL, with only those characters escaped that would end it."""
     for letter in ("%", "#", "\r", "\n", "\t"):
         text = text.replace(letter, f"%{ord(letter):02X}")
     return f"data:text/javascript;charset=utf-8,{text}"
@@ -85,18 +85,18 @@ def _csp_hash(text: str) -> str:
 
 
 def _page_json(arm: Arm, task_name: str | None, plan: PathPlan | None, meshes: dict[str, Any] | None) -> str:
-    """What the page must know besides the solver: the scene, words, and a plan."""
+    """The data of the page besides the solver: scene, labels and plan, as JavaScript constants."""
     solver = solver_json(arm, task_name)
-    drawn = {
+    scene = {
         **scene_json(arm),
         "robot_file": Path(arm.path).name if arm.path else arm.name,
         "lock": solver["held"] or None,
     }
     values = {
-        "arm": drawn | {"locks": False, "meshes": meshes},
+        "arm": scene | {"locks": False, "meshes": meshes},
         "solver": solver,
         "plan": None if plan is None else playback_json(arm, plan),
-        "slice": None if task_name else reach_slice(arm),  # slice of the task that fits the arm
+        "slice": None if task_name else reach_slice(arm),  # the slice is that of the arm's own task
     }
     return "".join(f"export const {name} = {_json_text(value)};\n" for name, value in values.items())
 

@@ -1,4 +1,4 @@
-"""Where the page's key is checked: another origin, a rebound name or a program without the key moves nothing."""
+"""Access control: requests of another origin, a rebound name or a program without the key are refused."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ KEY, TAB = "X-Armkin-Key", "X-Armkin-Tab"
 
 
 class RefusedError(Exception):
-    """A request that is answered with an HTTP status and a sentence, and does nothing."""
+    """Raised for a request that is refused with an HTTP status and a sentence."""
 
     def __init__(self, status: int, reason: str) -> None:
         super().__init__(reason)
@@ -18,7 +18,7 @@ class RefusedError(Exception):
 
 
 class Guard:
-    """One run's key, and the names under which the page is served."""
+    """The key of one run, and the host names of the page."""
 
     def __init__(self, port: int) -> None:
         self.key = secrets.token_urlsafe(24)
@@ -26,19 +26,19 @@ class Guard:
         self._origins = {f"http://{host}" for host in self._hosts}
 
     def check_read(self, headers: Mapping[str, str], *, page: bool = False) -> None:
-        """A GET: the Host must be ours (a rebound name is not), and no other origin may ask; page: for the page."""
+        """Check a GET: its Host must be ours, not a rebound name, its origin the page's; page: it asks for the page."""
         if headers.get("Host", "").lower() not in self._hosts:
             raise RefusedError(403, "this server answers to 127.0.0.1 and localhost only")
         if headers.get("Origin", next(iter(self._origins))).lower() not in self._origins:
             raise RefusedError(403, "another origin may not ask")
-        # A form or an image of another site sends no Origin; browsers say this instead. A link that opens the page
-        # itself, as the file does that `armkin teach` opens, gives its site nothing to read.
-        opens = headers.get("Sec-Fetch-Mode") == "navigate" and headers.get("Sec-Fetch-Dest") == "document"
-        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none") and not (page and opens):
+        # A form or an image of another site sends no Origin, but Sec-Fetch-Site. A link to the page itself, such as
+        # that in the file that `armkin teach` opens, is allowed, since its site cannot read the answer.
+        opens_page = headers.get("Sec-Fetch-Mode") == "navigate" and headers.get("Sec-Fetch-Dest") == "document"
+        if headers.get("Sec-Fetch-Site", "none") not in ("same-origin", "none") and not (page and opens_page):
             raise RefusedError(403, "another site may not ask")
 
     def check_action(self, headers: Mapping[str, str]) -> None:
-        """A POST: as a GET, with our Origin, this run's key and JSON."""
+        """Check a POST: as a GET, and it needs our Origin, this run's key and JSON."""
         self.check_read(headers)
         if "Origin" not in headers:
             raise RefusedError(403, "an action needs the page's Origin")

@@ -1,4 +1,4 @@
-"""A plan as the page plays it: between its samples joints go evenly, and the tip shown is off by a bounded length."""
+"""Samples of a plan for playback: joints are interpolated linearly, with a bounded error of the tip."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.plan.path_plan import PathPlan
 
-SHOWN_DISTANCE = 0.2  # distance [mm] that the tip shown may be off where it is looked at, for less than 0.5 in between
-MAX_SAMPLES = 160_000  # samples, at most, of some 80 bytes; a plan that needs more is shown less exactly, as is said
+SHOWN_DISTANCE = 0.2  # largest error [mm] of the tip at tested times, below 0.5 between them
+MAX_SAMPLES = 160_000  # most samples, of some 80 bytes each; longer plans are less exact
 
 
 def playback_json(arm: Arm, plan: PathPlan) -> dict[str, Any]:
-    """Joint values over time, the tip's way, speeds as shares of the limits; `shown_mm`: what the tip shown is off.
+    """Joint values over time, tip positions, speeds as shares of the limits; `shown_mm`: largest error of the tip.
 
-    `approach_s`: of the joint move that comes before it, from where the arm stands to its start.
+    `approach_s`: duration of the joint move from the arm's position to the start.
     """
     begins = [] if plan.trajectory is None else plan.trajectory.begins.tolist()
     t, deviation = sample_times(arm, plan, begins, SHOWN_DISTANCE, MAX_SAMPLES)

@@ -1,4 +1,4 @@
-"""One pose or one target of the page: where it is, every branch, limits in words, pulses."""
+"""Answers for one pose or target of the page: tip, branches, limits in words, pulses."""
 
 from __future__ import annotations
 
@@ -32,19 +32,19 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Question:
-    """What the page wants to know."""
+    """A question of the page."""
 
-    q: Array  # (n,) [rad | mm] the pose it shows
-    target: Sequence[float] | None = None  # [mm, deg] where the tip shall go; None: where it is
-    held: tuple[str, ...] = ()  # joints that stay
+    q: Array  # (n,) [rad | mm] the pose shown
+    target: Sequence[float] | None = None  # [mm, deg] target of the tip; None: its present pose
+    held: tuple[str, ...] = ()  # joints that keep their values
     branch: str = ""  # name of the branch to stay on
-    best: bool = False  # look for the pulses whose tip is nearest
-    nearest: bool = True  # look for the nearest pose within limits where no branch is
-    standing_pulses: tuple[int, ...] | None = None  # pulses where the arm stands; None: not known
+    best: bool = False  # search for the pulses whose tip is nearest
+    nearest: bool = True  # search for the nearest pose within limits if no branch is
+    standing_pulses: tuple[int, ...] | None = None  # pulses of the arm's position; None: unknown
 
 
 def answer_question(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
-    """The answer, as JSON in mm and degrees; quick: what solves, if not Python alone; it is built for what is asked."""
+    """The answer as JSON in mm and degrees; quick: solves by machine code, which is built on demand."""
     solved = _branches_json(arm, question, quick)
     q = solved.pop("q", question.q)
     T = fk(arm, q) + 0.0  # no -0.0
@@ -64,13 +64,13 @@ def answer_question(arm: Arm, question: Question, quick: QuickIk | None = None) 
 def motors_json(
     arm: Arm, q: Array, standing_pulses: Sequence[int] | None, *, best: bool = False
 ) -> dict[str, Any] | None:
-    """Pulses of a pose, the moves from where the arm stands (unknown: from home), what rounding costs at the tip."""
+    """Pulses of a pose, moves from the arm's position (from home if unknown), and the rounding error at the tip."""
     try:
         rounded = best_pulses(arm, q).chosen if best else rounding(arm, q)
     except UsageError:
         return None  # no drives; the scene says why
     start = pulses(arm, arm.home) if standing_pulses is None else np.asarray(standing_pulses)
-    bad = [
+    outside = [
         name
         for name, is_outside in zip(motor_names(arm), outside_travel(arm, rounded.pulses), strict=True)
         if is_outside
@@ -81,13 +81,13 @@ def motors_json(
         "from": "home" if standing_pulses is None else "arm",
         "error_mm": float(rounded.error),
         "best": best,
-        "outside_travel": bad,
+        "outside_travel": outside,
     }
 
 
 @lru_cache(maxsize=32)
 def _solvable_task(arm: Arm) -> tuple[Task | None, str]:
-    """The task that the page solves; None, and why, if no branches can be listed."""
+    """The task that the page solves; None and the reason if branches cannot be listed."""
     try:
         task = task_for(arm)
         recognise.solver(arm, task.name)
@@ -97,7 +97,7 @@ def _solvable_task(arm: Arm) -> tuple[Task | None, str]:
 
 
 def _target_of(arm: Arm, task: Task, question: Question, free_joints: list[int]) -> tuple[list[float], Array]:
-    """The target in its labels' units and as `ik` takes it: the question's own, or that of its pose.
+    """The target in its labels' units and as an argument of `ik`: the question's own, or that of its pose.
 
     free_joints: the joints that are not held.
     """
@@ -112,14 +112,14 @@ def _target_of(arm: Arm, task: Task, question: Question, free_joints: list[int])
 
 
 def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[str, Any]:
-    """Every branch of the target; `q` is the pose to show."""
+    """All branches of the target; `q` is the pose to show."""
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
     request = choose_branch.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
     prepared = choose_branch.prepared_arm(request)
-    task, why = _solvable_task(prepared)
+    task, reason = _solvable_task(prepared)
     if task is None:
-        return {"task": None, "why": why, "branches": [], "status": None}
+        return {"task": None, "why": reason, "branches": [], "status": None}
     if quick:
         quick.build(prepared, task.name)
     free_joints = [i for i, name in enumerate(arm.joint_names) if name not in held]
@@ -144,8 +144,10 @@ def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[
     if question.target is None:
         answer["chosen"] = _branch_of_pose(branches, question.q)
     elif answer_set.within_limits:
-        stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
-        answer["chosen"] = stay[0] if stay else 0  # a free one, if there is one
+        stay = [
+            index for index, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch
+        ]
+        answer["chosen"] = stay[0] if stay else 0  # the first branch, free of hits if possible
         answer["q"] = branches[answer["chosen"]].q
     elif question.nearest:
         [nearest] = choose_branch.closest(request, goal[None])
@@ -170,25 +172,25 @@ def _branch_json(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
 
 
 def _branch_of_pose(branches: Sequence[choose_branch.Branch], q: Array) -> int | None:
-    """The branch that a pose is on; None on a self-motion, where the pose is one of many."""
-    for k, branch in enumerate(branches):
-        apart = np.abs(branch.q - q)
-        if np.minimum(apart, np.abs(apart % (2 * np.pi) - 2 * np.pi)).max() < 1e-6 or apart.max() < 1e-6:
-            return k
+    """The index of the branch of a pose; None on a self-motion, which has many poses."""
+    for index, branch in enumerate(branches):
+        change = np.abs(branch.q - q)
+        if np.minimum(change, np.abs(change % (2 * np.pi) - 2 * np.pi)).max() < 1e-6 or change.max() < 1e-6:
+            return index
     return None
 
 
 def _hit_bodies(arm: Arm, q: Array) -> list[int]:
-    """Bodies that hit something, 0 the base's: also those that others hit."""
+    """Numbers of the bodies that take part in a hit, with 0 for the base."""
     if not arm.keep_out:
         return []
     bodies = ["base", *arm.joint_names]
-    named = {name for hit in hits(arm, q[None])[0][1] for name in (hit["body"], hit["with"])}
-    return [k for k, name in enumerate(bodies) if name in named]
+    hit_names = {name for hit in hits(arm, q[None])[0][1] for name in (hit["body"], hit["with"])}
+    return [number for number, name in enumerate(bodies) if name in hit_names]
 
 
 def _warnings(arm: Arm, q: Array) -> list[str]:
-    """Each joint outside its limits, and what the pose hits, in words."""
+    """The joints outside their limits and the hits of a pose, in words."""
     complaints = [outside_text(arm, int(i), float(q[i])) for i in np.flatnonzero(outside_limits(arm, q))]
     if arm.keep_out and (hit := hits(arm, q[None])[0][1]):
         complaints.append(f"it {hits_text(hit)}")

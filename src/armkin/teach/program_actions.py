@@ -1,4 +1,4 @@
-"""The page's actions on its program: edits, plans to be played, the path file's text."""
+"""The page's actions on its program: edits, plans for playback, text of the path file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class ProgramActions:
-    """One program that all pages show; `publish` is given it whenever it changes."""
+    """The program that all pages show; `publish` is called with it on every change."""
 
     def __init__(
         self, arm: Arm, standing_pulses: Callable[[], tuple[int, ...] | None], publish: Callable[[dict[str, Any]], None]
@@ -32,11 +32,11 @@ class ProgramActions:
         self._planning = threading.Lock()  # one plan at a time; edits do not wait for it
 
     def actions(self) -> dict[str, Action]:
-        """Name -> action, for the page in control."""
+        """{name: action} for the page in control."""
         return {"program": self.edit, "plan": self.plan, "end": self.end, "save": self.save, "load": self.load}
 
     def start(self) -> Array | None:
-        """Joint values where the arm stands; None if that is not known."""
+        """Joint values of the arm's position; None if unknown."""
         counts = self._standing_pulses()
         return None if counts is None else joints_of(self.arm, counts)
 
@@ -61,9 +61,9 @@ class ProgramActions:
             return {"text": self.program.text(), "name": f"{self.arm.name}_path.yaml"}
 
     def plan(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """The program's motion from where the arm stands, else from home: to be played.
+        """The program's motion from the arm's position, or from home if unknown, for playback.
 
-        One that hits something has `refused`, why, and `hit`, where the tip is then; a plan that is whole is played.
+        If it hits something, `refused` has the reason and `hit` the position of the tip there.
         """
         with self._planning:
             with self._lock:
@@ -75,11 +75,11 @@ class ProgramActions:
                     raise
                 q = units.joints_in(self.arm, error.fields["joints"])
                 has_motion = error.plan is not None and error.plan.trajectory is not None
-                way = playback_json(self.arm, error.plan) if has_motion else {"tips": []}
-                return {**way, "refused": str(error), "hit": fk(self.arm, q)[:3, 3].round(3).tolist()}
+                playback = playback_json(self.arm, error.plan) if has_motion else {"tips": []}
+                return {**playback, "refused": str(error), "hit": fk(self.arm, q)[:3, 3].round(3).tolist()}
 
     def end(self, tab: Tab, fields: Fields) -> dict[str, Any]:
-        """Where a move ends."""
+        """The joint values at the end of a move."""
         with self._lock:
             program = self.program.copied()
         index = request_checks.index_field(fields, "index", max(len(program.moves), 1))

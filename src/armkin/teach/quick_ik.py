@@ -1,6 +1,6 @@
-"""`armkin.ik` for an arm that is asked for again and again: by machine code, as soon as this computer has built it.
+"""`armkin.ik` for repeated questions on one arm: by machine code as soon as it is built.
 
-A drag asks ten times a second. A closed form takes Python 0.3 ms, an elimination 3 to 4 ms; in C that takes 0.05 ms.
+A drag needs ten answers a second. Python takes 0.3 ms for a closed form and 3 to 4 ms for an elimination, C 0.05 ms.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ if TYPE_CHECKING:
 
 
 class QuickIk:
-    """`ik`: of one arm by machine code once that is there; until then, of others, and without a compiler in Python."""
+    """Solves one arm by machine code once that is built; before, without a compiler, and for other arms in Python."""
 
     def __init__(self) -> None:
-        self._arm: Arm | None = None  # arm that is built, or has been
+        self._arm: Arm | None = None  # arm whose machine code is or was built
         self._built: CompiledArm | None = None
-        self.ready = threading.Event()  # built, or found not to be
+        self.ready = threading.Event()  # set when the build has ended or is not needed
 
     def build(self, arm: Arm, task: str) -> None:
-        """Build an arm that is solved by elimination, in a thread of its own; what is asked for later is not built."""
+        """Build the first arm that is asked for in a thread of its own, if it is solved by elimination."""
         if self._arm is not None:
             return
         self._arm = arm
@@ -43,19 +43,19 @@ class QuickIk:
 
     @property
     def built(self) -> bool:
-        """Whether machine code answers."""
+        """Whether machine code is in use."""
         return self._built is not None
 
-    def ik(self, arm: Arm, targets: Array, task: str | None, near: Array, **more: Any) -> Solutions:
-        """Solutions as of `armkin.ik`: by machine code once that is built."""
+    def ik(self, arm: Arm, targets: Array, task: str | None, near: Array, **options: Any) -> Solutions:
+        """Solutions as from `armkin.ik`, by machine code once that is built."""
         if self._built is None or arm is not self._arm:
-            return ik(arm, targets, task, near=near, **more)
-        return self._built.ik(targets, task, near, **more)
+            return ik(arm, targets, task, near=near, **options)
+        return self._built.ik(targets, task, near, **options)
 
     def _build(self, arm: Arm, task: str) -> None:
         from armkin.compiled.compiled_arm import compile
 
-        with suppress(ArmkinError):  # no compiler, or nowhere to build: Python goes on
+        with suppress(ArmkinError):  # without a compiler or a folder to build in, Python is used
             built = compile(arm, task)
             home = targets_of(solver(actual_arm(arm), task)[0], fk(arm, arm.home)[None], arm.home[None])
             built.ik(home, task, arm.home)  # the task's own library

@@ -1,4 +1,4 @@
-"""Where the arm reaches in the plane of its links, with which share of orientations, as cubic voxels for the page."""
+"""The reach in the plane of the arm's links, as cubic voxels with the share of orientations reached, for the page."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 VOXELS_ACROSS = 12  # voxels from joint 1's axis to the end of the reach
 DIRECTION_COUNT = 12  # directions of the tool's z axis in each voxel
-VALUE_COUNT = 12  # values of the redundant joint over its range if the others have a closed form; else it is at home
+VALUE_COUNT = 12  # values of the redundant joint if the other joints have a closed form; else only home
 
 
 @lru_cache(maxsize=4)
@@ -58,7 +58,7 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
 
 
 def _held_values(arm: Arm, free: Redundancy) -> Array:
-    """Values of the redundant joint that are asked [rad], home first."""
+    """Values of the redundant joint to test [rad], home first."""
     low, high, home = (float(limit[free.joint]) for limit in (arm.lower, arm.upper, arm.home))
     if not free.by_formula:
         return np.array([home])
@@ -67,8 +67,8 @@ def _held_values(arm: Arm, free: Redundancy) -> Array:
 
 
 def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
-    """Share of each cell's orientations that are reached at one of the values, free of hits."""
-    arm, j = grid.arm, free.joint
+    """The share of each cell's orientations that are reached without a hit at one of the values."""
+    arm, joint = grid.arm, free.joint
     M, count = grid.azimuths, grid.orientations
     centres = np.repeat(grid.rings, M * count, axis=0)
     azimuth = np.tile(np.repeat(np.arange(M) * (2 * np.pi / M), count), len(grid.rings))
@@ -76,10 +76,15 @@ def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
     reached = np.zeros(len(target), bool)
     near_enough = distance(arm, free.task, target) <= 1.0
     for value in values:
-        left = np.flatnonzero(near_enough & ~reached)
-        s = ik(free.rest, moved(arm, free, target[left], np.full(len(left), value)), free.task.name, examine=False)
-        good = s.within_limits
+        unreached = np.flatnonzero(near_enough & ~reached)
+        s = ik(
+            free.rest,
+            moved(arm, free, target[unreached], np.full(len(unreached), value)),
+            free.task.name,
+            examine=False,
+        )
+        legal = s.within_limits
         if arm.keep_out:
-            good = good & hits_nothing(arm, np.insert(np.where(good[:, :, None], s.q, np.nan), j, value, axis=2))
-        reached[left] = good.any(axis=1)
+            legal = legal & hits_nothing(arm, np.insert(np.where(legal[:, :, None], s.q, np.nan), joint, value, axis=2))
+        reached[unreached] = legal.any(axis=1)
     return np.asarray(reached.reshape(-1, count).mean(axis=1))

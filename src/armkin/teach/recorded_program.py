@@ -1,4 +1,4 @@
-"""A program: moves recorded one after another, in the words of a path file, with undo."""
+"""A program of recorded moves with the keys of a path file, and undo."""
 
 from __future__ import annotations
 
@@ -26,27 +26,27 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
-MAX_MOVES = 2000  # moves of a program, at most
-_MAX_UNDO = 100  # steps that can be undone
+MAX_MOVES = 2000  # most moves of a program
+_MAX_UNDO = 100  # most edits that can be undone
 _DIGITS = 6  # decimals of recorded numbers: a millionth of a degree or mm
 _SETTINGS = ("blend", "speed", "tool_speed", "tolerance")
 _NAMED_STEP = re.compile(r"^\s*- .*?#\s*(?P<name>.+?)\s*$")
 
 
 class Program:
-    """Moves of one arm. Every edit can be taken back."""
+    """The moves of one arm, with undo and redo of edits."""
 
     def __init__(self, arm: Arm) -> None:
         self.arm = arm
         self.head: dict[str, Any] = {}  # start, task, blend, speed, tool_speed, tolerance: as in a path file
         self.moves: list[dict[str, Any]] = []  # each as in a path file
-        self.names: list[str] = []  # names of the moves, "" if none was given
-        self.via: list[float] | None = None  # the point on the way of the arc that is being recorded
+        self.names: list[str] = []  # names of the moves, "" for none
+        self.via: list[float] | None = None  # the middle point of an arc that is being recorded
         self._undo_states: list[tuple[Any, ...]] = []
         self._redo_states: list[tuple[Any, ...]] = []
 
     def state(self) -> dict[str, Any]:
-        """JSON: what the pages show."""
+        """The state for the pages, as JSON."""
         return {
             "moves": [
                 {"kind": _move_kind(move), "name": name, "said": _figures_text(move), "blend": move.get("blend")}
@@ -61,17 +61,17 @@ class Program:
         }
 
     def edit(self, fields: Mapping[str, Any]) -> None:
-        """Carry out one edit: `do` names it. Raises UsageError and changes nothing if it makes no sense."""
+        """Carry out the edit that `do` names. Raises UsageError, without a change, for an invalid one."""
         edit_name = request_checks.text_field(fields, "do", 20)
         if edit_name in ("undo", "redo"):
-            back, forth = (
+            states, opposite_states = (
                 (self._undo_states, self._redo_states)
                 if edit_name == "undo"
                 else (self._redo_states, self._undo_states)
             )
-            if back:
-                forth.append(self._snapshot())
-                self._restore(back.pop())
+            if states:
+                opposite_states.append(self._snapshot())
+                self._restore(states.pop())
             return
         edits = {
             "record": self._record,
@@ -85,23 +85,23 @@ class Program:
         }
         if edit_name not in edits:
             raise UsageError(f"do: '{edit_name}' is none of {', '.join((*edits, 'undo', 'redo'))}")
-        before = self._snapshot()
+        snapshot = self._snapshot()
         try:
             edits[edit_name](fields)
             if self.moves:
                 self.file()
         except Exception:
-            self._restore(before)
+            self._restore(snapshot)
             raise
-        self._undo_states = [*self._undo_states[-_MAX_UNDO + 1 :], before]
+        self._undo_states = [*self._undo_states[-_MAX_UNDO + 1 :], snapshot]
         self._redo_states = []
 
     def document(self) -> dict[str, Any]:
-        """The program as a path file has it."""
+        """The program as the data of a path file."""
         return {"robot": self.arm.name, **self.head, "moves": self.moves}
 
     def file(self) -> PathFile:
-        """The program as a path file's model. Raises PathFileError if it is none."""
+        """The program as a path file's model. Raises PathFileError if it is invalid."""
         return path_file.validate_path(self.document())
 
     def text(self) -> str:
@@ -112,12 +112,12 @@ class Program:
         lines.append("moves:")
         for move, name in zip(self.moves, self.names, strict=True):
             entries = [f"{key}: {flow_text(value)}" for key, value in move.items()]
-            shown = entries[0] if len(entries) == 1 else "{" + ", ".join(entries) + "}"
-            lines.append(f"  - {shown}" + (f"  # {name}" if name else ""))
+            move_text = entries[0] if len(entries) == 1 else "{" + ", ".join(entries) + "}"
+            lines.append(f"  - {move_text}" + (f"  # {name}" if name else ""))
         return "\n".join(lines) + "\n"
 
     def load(self, text: str, name: str) -> None:
-        """Take the program of a path file's text. Raises PathFileError with the line, and changes nothing."""
+        """Replace the program by a path file's text. Raises PathFileError with the line, without a change."""
         file = path_file.parse_path_file(text, name)
         path_file.check_robot(file, self.arm.name, self.arm.path)
         check_numbers(self.arm, file)
@@ -131,11 +131,11 @@ class Program:
         self.head, self.moves, self.via = document, moves, None
         items = [line for line in text.splitlines() if line.lstrip().startswith("- ")]
         matches = [_NAMED_STEP.match(line) for line in items]
-        named = [match["name"][:60] if match else "" for match in matches]
-        self.names = named if len(named) == len(moves) else [""] * len(moves)
+        names = [match["name"][:60] if match else "" for match in matches]
+        self.names = names if len(names) == len(moves) else [""] * len(moves)
 
     def plan(self, start: Array | None, speed: float = 1.0) -> PathPlan:
-        """The motion; start: (n,) [rad | mm] where the arm stands, None: in its home pose; speed: a fraction."""
+        """The plan; start: (n,) [rad | mm] the arm's position, None: home; speed: a fraction."""
         if not self.moves:
             raise UsageError("the program has no moves: record one")
         from armkin.motion.path_planner.path import path
@@ -143,7 +143,7 @@ class Program:
         return path(self.arm, self.file(), start=start, speed=speed)
 
     def copied(self) -> Program:
-        """The moves and the head as they are now: to be planned while this one is edited."""
+        """A copy of head and moves, to be planned while this one is edited."""
         part = Program(self.arm)
         part.head, part.moves, part.names = copy.deepcopy((self.head, self.moves, self.names))
         return part
@@ -158,7 +158,7 @@ class Program:
     # Edits
 
     def _record(self, fields: Mapping[str, Any]) -> None:
-        """Append a move to the pose q, or put it behind `index`."""
+        """Add a move to the pose q at the end, or behind the move `index`."""
         if len(self.moves) >= MAX_MOVES:
             raise UsageError(f"a program has at most {MAX_MOVES} moves")
         kind = request_checks.text_field(fields, "kind", 20)
@@ -171,7 +171,7 @@ class Program:
         self.names.insert(index, "")
 
     def _make_move(self, kind: str, fields: Mapping[str, Any]) -> dict[str, Any]:
-        """A move of a path file [mm, deg] from what a page sends. Raises UsageError for what is no move."""
+        """A move of a path file [mm, deg] from a page's fields. Raises UsageError for an invalid one."""
         if kind == "wait":
             return {"wait": request_checks.number_field(fields, "seconds", 0, 3600)}
         if kind == "grip":
@@ -203,8 +203,8 @@ class Program:
         self.via = _round_values(fk(self.arm, q)[:3, 3].tolist())
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
-        typed = request_checks.text_field(fields, "name", 60)  # a comment of YAML has what can be printed
-        printable = "".join(c if c.isprintable() else " " for c in typed.replace("#", ""))
+        name = request_checks.text_field(fields, "name", 60)  # a YAML comment may only have printable characters
+        printable = "".join(c if c.isprintable() else " " for c in name.replace("#", ""))
         self.names[self._move_index(fields)] = " ".join(printable.split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
@@ -221,7 +221,7 @@ class Program:
         self.head, self.via = {}, None
 
     def _set_blend(self, fields: Mapping[str, Any]) -> None:
-        """A move's own blend radius; null: the program's."""
+        """Set a move's own blend radius; null: use the program's."""
         move = self.moves[self._move_index(fields)]
         if fields.get("blend") is None:
             move.pop("blend", None)
@@ -253,7 +253,7 @@ def _move_kind(move: Mapping[str, Any]) -> str:
 
 
 def _figures_text(move: Mapping[str, Any]) -> str:
-    """A move's figures for people."""
+    """A move's numbers as text."""
     value = move[_move_kind(move)]
     if isinstance(value, dict) and "to" in value:
         return ", ".join(f"{x:.1f}" for x in value["to"])

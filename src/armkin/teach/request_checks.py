@@ -1,4 +1,4 @@
-"""Whether a request's body and its fields are what they must be."""
+"""Checks of a request's body and fields."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 from armkin.errors import UsageError
 from armkin.teach.page_key import RefusedError
 
-MAX_BYTES = 256 * 1024  # size [bytes], at most, of a body: a path file of ten thousand moves
+MAX_BYTES = 256 * 1024  # largest body [bytes], for a path file of ten thousand moves
 
 
 def body_length(headers: Mapping[str, str]) -> int:
-    """Bytes of a body, known beforehand and bounded."""
+    """The length of a body [bytes] from its header, within MAX_BYTES."""
     text = headers.get("Content-Length", "")
     if "Transfer-Encoding" in headers or not (text.isascii() and text.isdigit() and len(text) < 12):
         raise RefusedError(411, "a body needs its Content-Length")
@@ -45,11 +45,11 @@ def _finite_float(text: str) -> float:
     return value
 
 
-# Fields of a body: what is not as it must be is a UsageError that names the field.
+# Fields of a body: an invalid one raises UsageError with its name.
 
 
 def number_list_field(fields: Mapping[str, Any], name: str, count: int) -> list[float]:
-    """A list of so many finite numbers."""
+    """A list of `count` finite numbers."""
     values = fields.get(name)
     if not isinstance(values, list) or len(values) != count:
         raise UsageError(f"{name}: expected {count} numbers")

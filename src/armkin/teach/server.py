@@ -1,7 +1,6 @@
-"""HTTP on 127.0.0.1: the page's files, a stream of events, actions.
+"""The HTTP server on 127.0.0.1: files of the page, a stream of events, actions.
 
-Each answer is written in one go: headers and body apart, with Nagle's algorithm and delayed acknowledgements,
-would take 40 ms.
+Each answer is one write: with headers and body apart, Nagle's algorithm and delayed acknowledgements would cost 40 ms.
 """
 
 from __future__ import annotations
@@ -25,13 +24,13 @@ from armkin.teach.page_key import KEY, TAB, Guard, RefusedError
 
 STATIC = Path(__file__).parent / "static"
 _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".svg": "image/svg+xml"}
-_MAX_STRANGERS = 100  # connections that have not shown the key, at most; beyond, the oldest one is closed
-_LOOK_PERIOD = 0.1  # time [s] between two looks at whether a page is still there
-_SILENCE_TIME = 15.0  # time [s] after which an event stream says something, so that dead lines are noticed
+_MAX_STRANGERS = 100  # most connections without the key; the oldest is closed
+_LOOK_PERIOD = 0.1  # time [s] between two checks for a closed page
+_SILENCE_TIME = 15.0  # time [s] after which an event stream sends a comment, to detect dead connections
 
 
 class Server(ThreadingHTTPServer):
-    """One arm's page."""
+    """The server of one arm's page."""
 
     daemon_threads = True
     request_queue_size = 128
@@ -45,11 +44,11 @@ class Server(ThreadingHTTPServer):
 
     @property
     def address(self) -> str:
-        """What to open in a browser; the key is in the fragment, which browsers do not send."""
+        """The address for a browser, with the key in the fragment, which browsers do not send."""
         return f"http://127.0.0.1:{self.server_address[1]}/#{self.guard.key}"
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Serve a new connection; of too many that have shown no key, close the oldest."""
+        """Serve a new connection, and close the oldest one without the key if there are too many."""
         with self._lock:
             self._strangers[id(request)] = request
             while len(self._strangers) > _MAX_STRANGERS:
@@ -58,29 +57,29 @@ class Server(ThreadingHTTPServer):
         super().process_request(request, client_address)
 
     def accept(self, request: Any) -> None:
-        """A connection has shown the key: it is not closed for others."""
+        """Mark a connection that has shown the key, so that it is not closed for others."""
         with self._lock:
             self._strangers.pop(id(request), None)
 
     def shutdown_request(self, request: Any) -> None:
-        """A connection ends."""
+        """Close a connection."""
         self.accept(request)
         super().shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """A connection that breaks is nothing to print: `_Handler` answers what goes wrong in an action."""
+        """Print nothing for a broken connection; `_Handler` answers errors of actions."""
 
 
 def _shut_down(connection: socket.socket) -> None:
     try:
         connection.shutdown(socket.SHUT_RDWR)
     except OSError:
-        return  # the page is gone already
+        return  # the page was closed already
 
 
 @cache
 def served_files() -> dict[str, tuple[str, bytes]]:
-    """Path -> kind and bytes of every file that is served; there are no others."""
+    """{path: (kind, content)} of every file that is served."""
     served = {}
     for path in sorted(STATIC.rglob("*")):
         if path.suffix in _KINDS:
@@ -93,23 +92,23 @@ class _Handler(BaseHTTPRequestHandler):
 
     protocol_version = "HTTP/1.1"
     disable_nagle_algorithm = True
-    wbufsize = -1  # one write an answer
+    wbufsize = -1  # buffer an answer for a single write
     timeout = 60.0
     server: Server
 
     def do_GET(self) -> None:
-        """A file, or the stream of events."""
+        """Answer a GET with a file, or the stream of events."""
         self._serve_guarded(self._serve_get)
 
     def do_POST(self) -> None:
-        """An action."""
+        """Carry out the action of a POST."""
         self._serve_guarded(self._serve_post)
 
     def _serve_guarded(self, serve: Callable[[], None]) -> None:
         try:
             serve()
         except RefusedError as error:
-            self.close_connection = True  # the request's body may still be on the way
+            self.close_connection = True  # the request's body may still arrive
             self._send_json(error.status, {"error": str(error), "kind": "refused"})
         except OSError:
             self.close_connection = True
@@ -148,7 +147,7 @@ class _Handler(BaseHTTPRequestHandler):
             self._send_json(200, answer)
 
     def _send_events(self, query: str) -> None:
-        """Tell a page what happens, until it is closed: its connection ends, which is looked at all the time."""
+        """Send events to a page until it is closed, which shows as the end of its connection."""
         tab = self.server.actions.tabs.find(query.removeprefix("tab="))
         self.server.actions.tabs.enter(tab)
         self.server.accept(self.connection)
@@ -158,16 +157,16 @@ class _Handler(BaseHTTPRequestHandler):
             self.end_headers()
             self.wfile.write(b"retry: 1000\n\n")
             self.wfile.flush()
-            silent = 0.0
+            silence = 0.0
             while not self._is_gone():
-                news = tab.hear(_LOOK_PERIOD)
-                silent = 0.0 if news else silent + _LOOK_PERIOD
-                for topic, message in news.items():
+                messages = tab.hear(_LOOK_PERIOD)
+                silence = 0.0 if messages else silence + _LOOK_PERIOD
+                for topic, message in messages.items():
                     text = json.dumps(message, allow_nan=False)
                     self.wfile.write(f"event: {topic}\ndata: {text}\n\n".encode())
-                if silent >= _SILENCE_TIME:
+                if silence >= _SILENCE_TIME:
                     self.wfile.write(b":\n\n")
-                    silent = 0.0
+                    silence = 0.0
                 self.wfile.flush()
         finally:
             self.server.actions.tabs.close_tab(tab)
@@ -199,15 +198,15 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("Cache-Control", "no-store")
 
     def version_string(self) -> str:
-        """What the Server header says."""
+        """The value of the Server header."""
         return "armkin"
 
     def log_message(self, *_: Any) -> None:
-        """Requests are not printed."""
+        """Print nothing for a request."""
 
 
 def _single_headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
-    """Headers by their canonical names; one that is there twice is refused."""
+    """Headers by their canonical names. Raises RefusedError for a duplicate of an important one."""
     headers: dict[str, str] = {}
     for name, value in handler.headers.items():
         key = name.title()
@@ -218,7 +217,7 @@ def _single_headers(handler: BaseHTTPRequestHandler) -> dict[str, str]:
 
 
 def _content_policy(nonce: str) -> str:
-    """What the page may load: our own files, and scripts with this answer's nonce."""
+    """The content security policy: only our own files, and scripts with this answer's nonce."""
     scripts = f"'nonce-{nonce}'" if nonce else "'none'"
     return (
         f"default-src 'none'; script-src {scripts}; style-src 'self'; img-src 'self' data:; connect-src 'self'; "

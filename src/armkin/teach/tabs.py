@@ -1,4 +1,4 @@
-"""The open pages: one holds control, the others watch; each hears the newest of every topic."""
+"""The open pages: one holds control, the others watch; each gets the newest message of every topic."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 from armkin.teach.page_key import RefusedError
 
-MAX_TABS = 4  # pages at once, at most: a browser keeps six connections to a server, and STOP must find one free
-_FORGET_TIME = 20.0  # time [s] until a page that has never listened is forgotten
+MAX_TABS = 4  # most pages: a browser has six connections to a server, and STOP needs a free one
+_FORGET_TIME = 20.0  # time [s] after which a page that never listened is removed
 
 
 class Tab:
@@ -21,18 +21,18 @@ class Tab:
         self.id = secrets.token_urlsafe(16)
         self.born = time.monotonic()
         self.listening = False
-        self.press = -1  # the last one of its jog's button that has begun a jog or was let go
+        self.press = -1  # last press of its jog button that began a jog or was released
         self._news: dict[str, Any] = {}
         self._ready = threading.Condition()
 
     def publish(self, topic: str, message: Any) -> None:
-        """Have the page hear something; what it has not heard of the topic yet is replaced."""
+        """Queue a message for the page, replacing an unread one of the same topic."""
         with self._ready:
             self._news[topic] = message
             self._ready.notify()
 
     def hear(self, timeout: float) -> dict[str, Any]:
-        """What is new, by topic; empty after `timeout` seconds."""
+        """The unread messages by topic; empty after `timeout` seconds."""
         with self._ready:
             if not self._news:
                 self._ready.wait(timeout)
@@ -41,11 +41,11 @@ class Tab:
 
 
 Fields = Mapping[str, Any]  # of an action's body
-Action = Callable[[Tab, Fields], dict[str, Any]]  # what a page asks for -> what it is told
+Action = Callable[[Tab, Fields], dict[str, Any]]  # page and fields of a request -> answer
 
 
 class Tabs:
-    """All open pages; `on_leave` is called when the page that holds control goes."""
+    """All open pages; `on_leave` is called when the page in control is closed."""
 
     def __init__(self, on_leave: Callable[[], None] = lambda: None) -> None:
         self._lock = threading.RLock()
@@ -71,7 +71,7 @@ class Tabs:
             raise RefusedError(429, f"the page is open {MAX_TABS} times already: close one of them")
 
     def find(self, name: str) -> Tab:
-        """The page of that id; RefusedError if there is none."""
+        """The page of an id. Raises RefusedError if there is none."""
         with self._lock:
             tab = self._tabs.get(name)
         if tab is None:
@@ -79,7 +79,7 @@ class Tabs:
         return tab
 
     def enter(self, tab: Tab) -> None:
-        """A page begins to listen; it holds control if nobody does."""
+        """Begin to listen, and take control if no page has it."""
         with self._lock:
             if tab.listening or tab.id not in self._tabs:
                 raise RefusedError(410, "this page is not known any more: reload it")
@@ -90,18 +90,18 @@ class Tabs:
             self._announce()
 
     def close_tab(self, tab: Tab) -> None:
-        """A page is closed."""
+        """Remove a closed page."""
         with self._lock:
-            held = self._control == tab.id
+            had_control = self._control == tab.id
             self._tabs.pop(tab.id, None)
-            if held:
+            if had_control:
                 self._control = ""
             self._announce()
-        if held:
+        if had_control:
             self._on_leave()
 
     def take_control(self, tab: Tab) -> None:
-        """A page takes control, on purpose."""
+        """Give a page control."""
         with self._lock:
             self._control = tab.id
             self._announce()
@@ -113,7 +113,7 @@ class Tabs:
                 raise RefusedError(409, "another page holds control: take control first")
 
     def publish(self, topic: str, message: Any, except_tab: Tab | None = None) -> None:
-        """Have all pages hear something, `except_tab` one."""
+        """Send a message to all pages except `except_tab`."""
         with self._lock:
             for tab in self._tabs.values():
                 if tab is not except_tab:

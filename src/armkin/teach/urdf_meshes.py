@@ -1,4 +1,4 @@
-"""The meshes of a URDF's <visual> elements, on the bodies of an arm: local files alone, coarse enough for a page."""
+"""Puts the meshes of a URDF's <visual> elements on the bodies of an arm: local files only, coarsened for a page."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from armkin.teach.mesh_files import read_triangles
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MAX_TRIANGLES = 18_000  # triangles, at most, of an arm: 0.43 MB of a page
-_MAX_FILES = 200  # mesh files, at most, of an arm
-_GRID_DIVISOR = 1000  # divisor of the reach that gives the finest grid on which corners stand
-_GRID_FACTOR = 1.25  # factor from a grid to the next one, until no more triangles are left
-_AXIS_DIFFERENCE = 0.1, 1e-3  # difference [mm], [rad], at most, between axes of the URDF and of the arm
+MAX_TRIANGLES = 18_000  # most triangles of an arm, 0.43 MB of a page
+_MAX_FILES = 200  # most mesh files of an arm
+_GRID_DIVISOR = 1000  # the finest grid of corners is the reach divided by this
+_GRID_FACTOR = 1.25  # factor from a grid to the next coarser one
+_AXIS_DIFFERENCE = 0.1, 1e-3  # largest difference [mm], [rad] between axes of the URDF and of the arm
 
 
 def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
-    """What a page draws: `unit` [mm], and of each body (0 the base) its triangles' corners as whole units.
+    """The meshes for a page: `unit` [mm], and for each body (0 the base) the corners of its triangles in units.
 
-    They are nine little-endian 16-bit numbers a triangle, in base64, in the frame after the body's joint (the base's:
+    A triangle is nine little-endian 16-bit numbers, in base64, in the frame after the body's joint (the base's:
     of targets); "" where a body has no mesh. Raises UsageError for the URDF of another arm, or a file that is no mesh.
     """
     bodies = _body_triangles(arm, path)
@@ -46,11 +46,11 @@ def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
 
 
 def _on_grid(body: Array, unit: float) -> Array:
-    """Corners (N, 3, 3) in whole units, without triangles that have become lines, and each one once."""
+    """Corners (N, 3, 3) in whole units, without degenerate and duplicate triangles."""
     corners = np.rint(body / unit).astype(np.int64)
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     corners = corners[np.cross(b - a, c - a).any(axis=1)].reshape(-1, 9)
-    corners = corners[np.lexsort(corners.T[::-1])]  # `np.unique` of rows takes longer where many are alike
+    corners = corners[np.lexsort(corners.T[::-1])]  # faster than `np.unique` of rows with many duplicates
     is_first = np.append(True, (corners[1:] != corners[:-1]).any(axis=1))[: len(corners)]
     return np.asarray(corners[is_first])
 
@@ -64,8 +64,8 @@ def _body_triangles(arm: Arm, path: str) -> list[Array]:
         )
     _, tree = parse_document(raw, path)
     first = tree.base(None)
-    after = _joint_frames(arm)
-    chain = _matching_joints(arm, tree, first, after)
+    joint_frames = _joint_frames(arm)
+    chain = _matching_joints(arm, tree, first, joint_frames)
     triangles_of: list[list[Array]] = [[np.zeros((0, 3, 3))] for _ in range(arm.n + 1)]
     stack = [(first, np.eye(4), 0)]
     files = 0
@@ -77,8 +77,8 @@ def _body_triangles(arm: Arm, path: str) -> list[Array]:
                 raise UsageError(f"{path}: more than {_MAX_FILES} meshes")
             if "mesh" in visual:
                 corners = _mesh_triangles(path, link, visual) @ T[:3, :3].T + T[:3, 3]
-                way = arm.base if body == 0 else inverse(after[body - 1]) @ arm.base
-                triangles_of[body].append(corners * urdf_reader.METRE @ way[:3, :3].T + way[:3, 3])
+                to_body = arm.base if body == 0 else inverse(joint_frames[body - 1]) @ arm.base
+                triangles_of[body].append(corners * urdf_reader.METRE @ to_body[:3, :3].T + to_body[:3, 3])
         for joint in tree.children[link]:
             child = str(joint.text("child", "link"))
             stack.append(
@@ -96,9 +96,9 @@ def _joint_frames(arm: Arm) -> list[Array]:
     return frames
 
 
-def _matching_joints(arm: Arm, tree: Tree, first: str, after: list[Array]) -> list[Joint]:
-    """The moving joints of the URDF that are the arm's: those with its axes at joint values 0."""
-    worst = ""
+def _matching_joints(arm: Arm, tree: Tree, first: str, joint_frames: list[Array]) -> list[Joint]:
+    """The moving joints of the URDF with the arm's axes at joint values 0."""
+    mismatch = ""
     for leaf in tree.leaves(first):
         T, axes = np.eye(4), []
         for joint in tree.chain(first, leaf):
@@ -106,22 +106,24 @@ def _matching_joints(arm: Arm, tree: Tree, first: str, after: list[Array]) -> li
             if joint.kind != "fixed":
                 axes.append((joint, T[:3, :3] @ urdf_reader.joint_axis(joint, tree.name), T[:3, 3] * urdf_reader.METRE))
         if len(axes) < arm.n:
-            worst = worst or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
+            mismatch = mismatch or f"it has {len(axes)} moving joints on the way to {leaf}, the arm {arm.n}"
             continue
-        for k, (joint, z, p) in enumerate(axes[: arm.n]):
-            joint_frame = inverse(arm.base) @ after[k]
+        for index, (joint, z, p) in enumerate(axes[: arm.n]):
+            joint_frame = inverse(arm.base) @ joint_frames[index]
             offset = p - joint_frame[:3, 3]
-            away = (
+            distance = (
                 0.0
-                if arm.prismatic[k]
+                if arm.prismatic[index]
                 else float(np.linalg.norm(offset - (offset @ joint_frame[:3, 2]) * joint_frame[:3, 2]))
             )
-            if away > _AXIS_DIFFERENCE[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _AXIS_DIFFERENCE[1]:
-                worst = f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[k]}"
+            if distance > _AXIS_DIFFERENCE[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _AXIS_DIFFERENCE[1]:
+                mismatch = (
+                    f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[index]}"
+                )
                 break
         else:
             return [joint for joint, _, _ in axes[: arm.n]]
-    raise UsageError(f"{tree.name}: is not the URDF of {arm.name}: {worst}")
+    raise UsageError(f"{tree.name}: is not the URDF of {arm.name}: {mismatch}")
 
 
 def _mesh_triangles(path: str, link: str, visual: dict[str, dict[str, str]]) -> Array:
@@ -134,7 +136,7 @@ def _mesh_triangles(path: str, link: str, visual: dict[str, dict[str, str]]) -> 
 
 
 def _mesh_path(path: str, name: str, context: str) -> Path:
-    """The local file that a URDF names: beside it, or package://NAME/..., in a folder NAME above it."""
+    """The local file of a mesh: beside the URDF, or for package://NAME/... in a folder NAME above it."""
     scheme, colon, address = name.partition("://")
     if Path(name).suffix.lower() not in (".stl", ".dae"):
         raise UsageError(f"{context}: mesh {name[:80] or 'without a filename'} is neither .stl nor .dae")
@@ -145,9 +147,9 @@ def _mesh_path(path: str, name: str, context: str) -> Path:
         return Path(address)
     if scheme != "package":
         raise UsageError(f"{context}: mesh {name[:80]} is no local file: package://, file:// or a path beside the URDF")
-    package, _, inside = address.partition("/")
-    for above in [folder, *folder.parents]:
-        for place in (above / package / inside, above / inside):
-            if place.is_file():
-                return place
+    package, _, relative = address.partition("/")
+    for parent in [folder, *folder.parents]:
+        for candidate in (parent / package / relative, parent / relative):
+            if candidate.is_file():
+                return candidate
     raise UsageError(f"{context}: mesh {name[:80]} is not found in the URDF's folder or above it")
