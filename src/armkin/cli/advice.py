@@ -1,7 +1,6 @@
-"""The next step after an error, in the command line's words.
+"""The next step after an error, as options and commands.
 
-An error of the core says what is wrong, and what a program can do about it; somebody at a terminal has
-options and commands instead.
+Errors of the core advise what a program can do. This module replaces that by advice for a user at a terminal.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ from armkin.robot_file.catalogue import shipped_file
 
 
 def next_step(error: ArmkinError) -> str:
-    """What to type next; empty if the message says it all.
+    """The options or the command to type next; empty if the message is enough.
 
     >>> next_step(PortInUseError("in use", advice="wait for it", port="COM3", process=7))
     'wait for it, or armkin stop --port COM3'
@@ -46,7 +45,7 @@ def message_with_advice(error: ArmkinError) -> str:
     if not step:
         return error.message
     lines = error.message.count("\n") + 1
-    if error.fields.get("lines_to_add"):  # to a copy of a shipped robot: two lines, and `info` shows the others
+    if error.fields.get("lines_to_add"):  # a shipped robot needs a copy first, and `info` shows the lines
         return f"{error.message.partition('; add to ')[0]}\n{step}"
     return f"{error.message}{': ' if lines > 1 or isinstance(error, _ONE_LINE) else chr(10)}{step}"
 
@@ -58,7 +57,7 @@ def _redundant_advice(error: ArmkinError) -> str:
 
 
 def _missing_keys_advice(error: ArmkinError) -> str:
-    """Where the lines to add are shown; what a shipped robot lacks is added to a copy of its file."""
+    """The command that shows the lines to add, in a copy of the file for a shipped robot."""
     if (step := _NEEDED.get(error.fields.get("needs", ""))) is not None:
         return step
     if error.fields.get("undriven"):
@@ -108,5 +107,5 @@ _WORDS: dict[type[ArmkinError], Callable[[ArmkinError], str]] = {
     GripperLostError: lambda error: "armkin grip ROBOT open --assume open (or closed, or a value) says where it stands",
     GripperKnownError: lambda error: "leave --assume out",
     UnfinishedError: lambda error: "the same command with --resume goes on; without these parts another one may begin",
-    UsageError: _missing_keys_advice,  # the last: NoHomingError and others are such, too
+    UsageError: _missing_keys_advice,  # last, as it is a base class of NoHomingError and others
 }

@@ -1,4 +1,4 @@
-"""The shell around the commands: the group, and what runs a command line (`exit_codes`: errors become exit codes)."""
+"""The group of commands, and the function that runs a command line; `exit_codes` handles its errors."""
 
 import os
 import signal
@@ -24,7 +24,7 @@ _SETTINGS = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
 
 
 class Command(TyperCommand):
-    """A command whose negative numbers are arguments, and whose help has no names of Python types."""
+    """A command that takes negative numbers as arguments, and whose help has no names of Python types."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the options first, then the arguments."""
@@ -59,7 +59,7 @@ class Command(TyperCommand):
 
 
 class Commands(TyperGroup):
-    """The group: lists all commands, and imports the one that runs."""
+    """The group of all commands, which imports only the one that runs."""
 
     def __init__(self, **settings: Any) -> None:
         super().__init__(**settings)
@@ -127,17 +127,17 @@ def _command_group() -> Any:
 
 def run(arguments: list[str]) -> int:
     """Run a command line, without the program's name, and return its exit code; no exception leaves here."""
-    before = {number: signal.signal(number, _terminate) for number in _ending_signals()}
+    old_handlers = {number: signal.signal(number, _terminate) for number in _ending_signals()}
     if arguments[:1] in ([], ["help"]):  # armkin help fk
         arguments = [*arguments[1:2], "--help"]
     output.for_programs("--json" in arguments, [*arguments, os.environ.get("ARMKIN_PORT", "")])
     try:
         code = _exit_code(lambda: _command_group()(arguments, prog_name="armkin", standalone_mode=False))
-        # What a failed command has printed stays printed: the rows of a batch before the malformed one.
+        # The output of a failed command is kept, for example the rows of a batch before a malformed one.
         return _exit_code(_flush_output) or code
     finally:
         output.flush()
-        for number, handler in before.items():
+        for number, handler in old_handlers.items():
             signal.signal(number, handler)
 
 
@@ -145,7 +145,7 @@ def _exit_code(command: Callable[[], Any]) -> int:
     try:
         return int(command() or 0)
     except (KeyboardInterrupt, typer.Abort):
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # a second Ctrl-C while the first one tidies up
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # ignore a second Ctrl-C during clean-up
         return _INTERRUPT_CODE
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 1
@@ -161,7 +161,7 @@ def _flush_output() -> None:
 
 
 def _ending_signals() -> list[int]:
-    """The signals that end a command, but for those that its parent has it ignore, as `nohup` does."""
+    """The signals that end a command, except those that its parent ignores, as `nohup` does."""
     numbers = (getattr(signal, name, None) for name in ("SIGTERM", "SIGHUP"))
     return [number for number in numbers if number is not None and signal.getsignal(number) != signal.SIG_IGN]
 
@@ -171,13 +171,13 @@ def _terminate(signum: int, frame: FrameType | None) -> None:
     if put_off(signum, frame):
         return
     for number in _ending_signals():
-        signal.signal(number, signal.SIG_IGN)  # once is enough
+        signal.signal(number, signal.SIG_IGN)  # ignore repeated signals
     sys.exit(128 + signum)
 
 
 @contextmanager
 def _closed_pipes() -> Iterator[None]:
-    """Keep a closed pipe from Typer, which would end the process with exit code 1."""
+    """Turn a closed pipe into ClosedPipe, since Typer would end the process with exit code 1."""
     try:
         yield
     except OSError as error:

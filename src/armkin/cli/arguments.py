@@ -1,4 +1,4 @@
-"""From words to what the API takes: the arm, joint values, one pose or a batch of them."""
+"""Converts words of the command line to arguments of the API: arm, joint values, targets."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 def load_arm(robot: str, scene: str | None = None, tool: str | None = None) -> Arm:
-    """The arm of a robot file, or of a shipped robot, in its scene; tool: what `--tool` says."""
+    """The arm of a robot file, or of a shipped robot, in its scene; tool: the value of `--tool`."""
     from armkin.keep_out.load_with_scene import load
     from armkin.robot_file.catalogue import locate
 
@@ -44,7 +44,7 @@ def _tool_numbers(tool: str) -> list[float]:
 
 
 def percent(text: str, option: str) -> float:
-    """A share of the joints' limits, given in percent: 0.0001 to 1. A value below 1 may be meant as a share: said."""
+    """A share of the joints' limits from percent: 0.0001 to 1; a note warns of a value below 1, perhaps a share."""
     value = number(text, option)
     if not 0.01 <= value <= 100:
         raise UsageError(f"{option}: '{text}' must be from 0.01 to 100 percent", argument=option, least=0.01, most=100)
@@ -53,8 +53,8 @@ def percent(text: str, option: str) -> float:
     return value / 100
 
 
-def standard_input(most: int, instead: str = "") -> bytes:
-    """All of standard input, at most so many bytes; instead: what to give where there are more.
+def standard_input(max_bytes: int, instead: str = "") -> bytes:
+    """All of standard input, at most `max_bytes`; instead: advice for a longer one.
 
     Raises FileError if it is closed or cannot be read, UsageError if it is longer.
     """
@@ -62,11 +62,11 @@ def standard_input(most: int, instead: str = "") -> bytes:
         raise FileError("standard input is closed")
     files.protect_input(0)
     try:
-        content = sys.stdin.buffer.read(most + 1)
+        content = sys.stdin.buffer.read(max_bytes + 1)
     except (OSError, ValueError) as error:
         raise FileError(f"standard input: cannot read: {getattr(error, 'strerror', None) or error}") from None
-    if len(content) > most:
-        size = f"{most // 1_000_000} MB" if most >= 1_000_000 else f"{most // 1000} kB"
+    if len(content) > max_bytes:
+        size = f"{max_bytes // 1_000_000} MB" if max_bytes >= 1_000_000 else f"{max_bytes // 1000} kB"
         raise UsageError(f"more than {size} on standard input{instead}")
     return content
 
@@ -80,8 +80,8 @@ def required_robot(robot: str | None) -> str:
 
 def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
     """One value for each joint [deg | mm], or the name of a pose."""
-    if words is not None and len(words) == 1 and (named := _named_pose(arm, words[0], "")) is not None:
-        return named
+    if words is not None and len(words) == 1 and (pose := _named_pose(arm, words[0], "")) is not None:
+        return pose
     values = numbers(words or (), arm.joint_names, arm.name)
     unit_notes.joint_values(arm, values)
     return values
@@ -89,9 +89,9 @@ def joints(arm: Arm, words: Sequence[str] | None) -> list[float]:
 
 def joint_list(arm: Arm, text: str, option: str) -> list[float]:
     """One value for each joint [deg | mm], comma-separated, or the name of a pose."""
-    named = _named_pose(arm, text, f"{option}: ")
-    if named is not None:
-        return named
+    pose = _named_pose(arm, text, f"{option}: ")
+    if pose is not None:
+        return pose
     values = comma_separated(text, arm.joint_names, option)
     unit_notes.joint_values(arm, values, f"{option}'s numbers")
     return values
@@ -104,8 +104,8 @@ def _named_pose(arm: Arm, word: str, context: str) -> list[float] | None:
         return poses[word]
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_.-]*", word) or word.lower() in (*NOT_FINITE, "pi"):
         return None
-    close = get_close_matches(word, poses, 1)
-    hint = f"did you mean {close[0]}?" if close else f"its poses: {', '.join(poses)}"
+    matches = get_close_matches(word, poses, 1)
+    hint = f"did you mean {matches[0]}?" if matches else f"its poses: {', '.join(poses)}"
     example = " ".join(arm.joint_names)
     raise UsageError(f"{context}{arm.name} has no pose '{word}'; {hint} (or give joint values: {example})")
 
@@ -126,7 +126,7 @@ _MEANING = {"phi": "phi is the tool's pitch, the sum of the parallel joints' ang
 
 
 def _other_task(arm: Arm, task: Task, count: int) -> str:
-    """What a label means that is no coordinate, and the task that takes as many numbers as were given."""
+    """Hints: the meaning of a label that is no coordinate, and a task with as many numbers as were given."""
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.inverse.tasks.task import LABELS
 
@@ -142,8 +142,8 @@ def _other_task(arm: Arm, task: Task, count: int) -> str:
 def target_list(arm: Arm, task: Task, text: str, words: Sequence[str] | None = None) -> list[float]:
     """The numbers of `--target X,Y,Z` [mm, deg]; words: words that stand behind the option, numbers for its target."""
     if words and is_number(text) and all(map(is_number, words)):
-        joined = ",".join([text, *words])
-        raise UsageError(f"--target: separate the numbers with commas: --target {joined}")
+        example = ",".join([text, *words])
+        raise UsageError(f"--target: separate the numbers with commas: --target {example}")
     values = comma_separated(text, task.labels, f"--target (task {task.name})")
     unit_notes.note_target(arm, task.labels, values)
     return values
@@ -157,13 +157,13 @@ def check_commas(arm: Arm, task: str | None, text: str, words: Sequence[str]) ->
 
 
 def one_alone(workers: int, cluster: str | None, resume: bool) -> None:
-    """One row is not shared, and there is nothing to go on with."""
+    """Raise UsageError for options of batches beside a single row."""
     for option, is_given in (("--workers", workers > 1), ("--cluster", cluster is not None), ("--resume", resume)):
         if is_given:
             raise UsageError(f"{option} belongs to --batch: one row is not shared")
 
 
 def no_numbers(words: Sequence[str] | None) -> None:
-    """A batch takes its numbers from the file alone."""
+    """Raise UsageError for numbers beside --batch."""
     if words:
         raise UsageError(f"numbers on the command line ({' '.join(words)}) and --batch: give one of the two")

@@ -22,11 +22,11 @@ from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError
 
-_OBJECT_ROWS = 4096  # rows that become objects together: Python's take a hundred times the room of numbers
+_OBJECT_ROWS = 4096  # rows converted to objects at once, which take a hundred times the memory of numbers
 
 
 class Questions(Protocol):
-    """What a command answers of each row; it can be pickled."""
+    """The questions of a command for each row of a batch; picklable."""
 
     unsolvable: bool  # whether a row that is not `good` has no answer; else it is outside the limits
 
@@ -39,7 +39,7 @@ class Questions(Protocol):
 
 @dataclass
 class Tally:
-    """What a batch came to, for the warning and the exit code."""
+    """Counts of a batch, for the warning and the exit code."""
 
     rows: int = 0
     bad: int = 0  # rows outside the limits, or without a best branch
@@ -47,7 +47,7 @@ class Tally:
     skipped: int = 0  # rows without values
 
     def add(self, chunk_tally: Tally) -> None:
-        """Count another chunk, too."""
+        """Add the counts of a chunk."""
         firsts = [first for first in (self.first_bad, chunk_tally.first_bad) if first]
         self.first_bad = min(firsts, default=0)
         self.rows, self.bad, self.skipped = (
@@ -73,17 +73,17 @@ class Tally:
 
 
 class Job(NamedTuple):
-    """Questions, and what to make of their answers."""
+    """Questions, and the form of their answers."""
 
     questions: Questions
     as_json: bool
-    format: str  # the ending of what is written
+    format: str  # ending of the output's name
     compiled: bool = False  # machine code prints the rows
-    parts: Parts | None = None  # where a process of the pool keeps what it has finished, instead of handing it back
+    parts: Parts | None = None  # where a process of the pool stores finished pieces instead of returning them
 
 
 class Done(NamedTuple):
-    """A finished piece: its bytes, and what to do with them."""
+    """A finished piece: its bytes and counts."""
 
     number: int
     input: str
@@ -91,16 +91,16 @@ class Done(NamedTuple):
     heading: list[str]
     tally: Tally
     problem: ArmkinError | None = None  # a malformed row behind those that were answered
-    near: list[float] | None = None  # where the next piece goes on, for questions that follow each other
-    stored: bool = False  # the bytes stand in a part already
+    near: list[float] | None = None  # joint values at the end, for questions that depend on the row before
+    stored: bool = False  # whether the bytes are stored in a part already
 
     def about(self) -> dict[str, Any]:
-        """What is kept beside the bytes."""
+        """The fields that are stored beside the bytes."""
         return {"input": self.input, "heading": self.heading, "near": self.near, **asdict(self.tally)}
 
 
 def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
-    """The rows of a piece up to a malformed one, what is wrong with which is appended."""
+    """The rows of a piece up to a malformed one, whose error is appended to `malformed`."""
     try:
         yield from parse_piece(piece)
     except UsageError as error:
@@ -108,7 +108,7 @@ def _well_formed(piece: Piece, malformed: list[UsageError]) -> Iterator[Chunk]:
 
 
 def _table_encoder(job: Job) -> Callable[[Table], bytes]:
-    """What makes bytes of a table."""
+    """The function that encodes a table."""
     file_format = format_of(f"x{job.format}")
     if not (job.compiled and file_format.is_text):
         return file_format.encoded
@@ -118,7 +118,7 @@ def _table_encoder(job: Job) -> Callable[[Table], bytes]:
 
 
 def answer_piece(job: Job, piece: Piece) -> Done:
-    """Answer one piece of the input: a pure function, wherever it runs."""
+    """Answer one piece of the input; a pure function that may run in any process."""
     tally, encoded_parts, heading = Tally(), list[bytes](), list[str]()
     encoded, malformed = _table_encoder(job), list[UsageError]()
     for chunk in _well_formed(piece, malformed):
@@ -157,15 +157,15 @@ def _json_lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
         span = slice(start, start + _OBJECT_ROWS)
         part = Chunk(chunk.numbers[span], chunk.values[span])
         for number, answer in zip(part.numbers, questions.objects(part), strict=True):
-            bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])
-            tally.add(Tally(1, int(bad), number if bad else 0))
+            is_bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])
+            tally.add(Tally(1, int(is_bad), number if is_bad else 0))
             lines.append(to_json(answer))
     return "\n".join([*lines, ""]).encode()
 
 
 def _count_bad_rows(tally: Tally, chunk: Chunk, good: Any) -> None:
-    bad = (~good).nonzero()[0]
-    tally.add(Tally(len(good), len(bad), int(chunk.numbers[int(bad[0])]) if len(bad) else 0))
+    bad_rows = (~good).nonzero()[0]
+    tally.add(Tally(len(good), len(bad_rows), int(chunk.numbers[int(bad_rows[0])]) if len(bad_rows) else 0))
 
 
 @dataclass
@@ -178,7 +178,7 @@ class BatchRun:
     workers: int
     cluster: str | None
     resume: bool
-    settings: Mapping[str, Any]  # what the bytes depend on besides robot and input, for --resume
+    settings: Mapping[str, Any]  # settings that change the bytes, checked by --resume
 
     @property
     def compiled(self) -> bool:
@@ -187,7 +187,7 @@ class BatchRun:
 
     @property
     def engine(self) -> Engine:
-        """Where the work is done."""
+        """The engine for the work."""
         return Engine(self.workers, self.cluster)
 
     def run(self, pieces: Rows) -> Tally:
@@ -211,7 +211,7 @@ class BatchRun:
         return tally
 
     def _stream(self, file_format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
-        """To a pipe, piece by piece; what is no text when all is there."""
+        """Write to a pipe piece by piece, or a binary format at the end."""
         binary_parts: list[bytes] = []
         with _binary_writer(self.out) as write, output.progress("rows", pieces.count) as tick:
             for finished in in_order(self.engine, answer_piece, job, pieces):

@@ -1,4 +1,4 @@
-"""Pieces of a batch's input: so many rows each, read one after the other and parsed wherever the piece is answered."""
+"""Pieces of a batch's input, read in order and parsed in the process that answers them."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 
 class Piece(NamedTuple):
-    """Some rows: lines of text with what the heading says of them, or values (N, m).
+    """Some rows: lines of text with their columns, or values (N, m).
 
-    number: from 0; first: the first row's number, from 1; source: what messages call the input.
+    number: from 0; first: the first row's number, from 1; source: the input's name in messages.
     """
 
     number: int
@@ -34,7 +34,7 @@ class Piece(NamedTuple):
     values: Array | None = None
 
     def digest(self) -> str:
-        """What tells this input from another."""
+        """A digest that identifies the input."""
         content = self.lines if self.values is None else self.values.tobytes()
         return hashlib.sha256(content).hexdigest()
 
@@ -50,7 +50,7 @@ class Rows:
         named: Mapping[str, Sequence[float]] | None = None,
         values: Sequence[Sequence[float]] = (),
     ) -> None:
-        """source: a name, or None for values that are there already; the rest: see `csv_to_numbers.Columns`."""
+        """source: a name, or None for given values; others: see `csv_to_numbers.Columns`."""
         self.source, self.names, self.purpose = source, tuple(names), purpose
         self.named, self.values = named, values
         if source is not None:
@@ -58,11 +58,11 @@ class Rows:
 
     @property
     def size(self) -> int | None:
-        """Size of the file [bytes]; None for what is no file."""
+        """Size of the file [bytes]; None for other inputs."""
         return os.path.getsize(self.source) if self.source is not None and os.path.isfile(self.source) else None
 
     def count(self) -> int | None:
-        """How many rows there are to come, for the progress; None: not known before they are read."""
+        """The number of rows, for the progress; None: unknown before reading."""
         if self.source is None:
             return len(self.values)
         text = not self.source.lower().endswith((".npz", ".parquet"))
@@ -87,9 +87,9 @@ class Rows:
 
     def empty(self, skipped: int) -> ArmkinError:
         """The error of an input without rows."""
-        why = "has no row with values" if skipped else "is empty"
+        reason = "has no row with values" if skipped else "is empty"
         name = csv_to_numbers.name_of(self.source or "-")
-        return UsageError(f"{name} {why}; it needs one row of {','.join(self.names)} per pose")
+        return UsageError(f"{name} {reason}; it needs one row of {','.join(self.names)} per pose")
 
     def _of_values(self, chunks: Any) -> Iterator[Piece]:
         first = 1
@@ -98,7 +98,7 @@ class Rows:
             first += len(values)
 
     def _of_text(self, source: str) -> Iterator[Piece]:
-        learner = Columns(self.names, self.purpose, self.named)  # learns the heading, for the pieces after it
+        learner = Columns(self.names, self.purpose, self.named)  # reads the heading for all later pieces
         number, first = 0, 1
         with csv_to_numbers.open_source(source) as file:
             for block in csv_to_numbers.text_blocks(file, source):
@@ -123,7 +123,7 @@ class Rows:
 
 
 def parse_piece(piece: Piece) -> Iterator[Chunk]:
-    """The rows of a piece; a malformed one raises UsageError, after those before it were given out."""
+    """The rows of a piece. Raises UsageError for a malformed one, after yielding those before it."""
     if piece.values is not None:
         yield from _finite_rows(piece, piece.values)
         return
@@ -132,22 +132,22 @@ def parse_piece(piece: Piece) -> Iterator[Chunk]:
 
 
 def _finite_rows(piece: Piece, values: Array) -> Iterator[Chunk]:
-    """Rows of finite numbers; rows without any are passed over."""
+    """Rows of finite numbers; rows without numbers are skipped."""
     import numpy as np
 
-    first, absent = piece.first, np.isnan(values)
-    keep = np.asarray(~absent.all(axis=1))
-    bad = np.argwhere(~(np.abs(values) <= MAX_NUMBER) & keep[:, None])
-    end = int(bad[0, 0]) if len(bad) else len(values)
+    first, is_nan = piece.first, np.isnan(values)
+    keep = np.asarray(~is_nan.all(axis=1))
+    invalid = np.argwhere(~(np.abs(values) <= MAX_NUMBER) & keep[:, None])
+    end = int(invalid[0, 0]) if len(invalid) else len(values)
     present = np.flatnonzero(keep[:end])
     if len(present):
         is_whole = len(present) == len(values)
         yield (
             Chunk(range(first, first + end), values) if is_whole else Chunk((first + present).tolist(), values[present])
         )
-    if len(bad):
-        row, column = bad[0].tolist()
+    if len(invalid):
+        row, column = invalid[0].tolist()
         value = values[row, column]
         large = f"{value:g} is too large; numbers here go up to {MAX_NUMBER:g}"
-        why = "a number is missing" if np.isnan(value) else large
-        raise UsageError(f"{piece.source}: row {first + row}: {piece.names[column]}: {why}", row=first + row)
+        reason = "a number is missing" if np.isnan(value) else large
+        raise UsageError(f"{piece.source}: row {first + row}: {piece.names[column]}: {reason}", row=first + row)

@@ -1,4 +1,4 @@
-"""What the commands that talk to a board share: the port's options, signals, an open machine."""
+"""Shared by all commands that use a board: options of the port, signals, an open machine."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ AT_HOME = "the simulated board starts with the arm in its home pose, and forgets
 
 @dataclass(frozen=True)
 class Link:
-    """The options of a command that say how it reaches its board, and what it takes for granted there."""
+    """The options of a command on its connection to a board, and on assumptions there."""
 
     port: str | None
     baud: int | None
@@ -82,9 +82,9 @@ class Link:
 def open_backend(
     board: Board, port: str | None, baud: int | None, *, simulated: str = AT_HOME, reset: bool = True
 ) -> Iterator[Backend]:
-    """The arm on a board of any kind behind a port, given back at the end; a signal stops the arm first.
+    """The arm on a board of any kind behind a port, which is closed at the end; a signal stops the arm first.
 
-    simulated: what to say of a board in this process.
+    simulated: the note for a simulated board.
     """
     from armkin.board.backend import StoppedError
     from armkin.board.open_board import open_board
@@ -104,7 +104,7 @@ def open_backend(
 
 
 def _once_a_day(port: str, words: Sequence[str]) -> None:
-    """What a kind of board cannot promise: told on a port's first use of a day."""
+    """Print the limitations of a kind of board on a port's first use of a day."""
     from datetime import date
 
     from armkin.board.ports import note_path, read_note, write_note
@@ -121,7 +121,7 @@ def _goes_on(machine: Backend) -> str:
 
 
 def can_resume(options: Mapping[str, object]) -> None:
-    """Raise UsageError for what makes no sense beside --resume: option -> whether it is given."""
+    """Raise UsageError for an option that contradicts --resume; options: {option: whether it is given}."""
     for option, is_given in options.items():
         if is_given:
             raise UsageError(f"--resume and {option}: a motion that was held goes on from where the arm stands")
@@ -129,7 +129,7 @@ def can_resume(options: Mapping[str, object]) -> None:
 
 @contextmanager
 def motion_progress(plans: Sequence[Planned], note: Callable[[float], None]) -> Iterator[Progress]:
-    """A bar for the plans' time on a terminal, and the note of a motion under way."""
+    """A progress bar of the plans' time on a terminal, which also updates the note of the motion."""
     with output.progress("ms of motion", round(1000 * sum(plan.duration for plan in plans))) as tick:
 
         def report(elapsed: float, _: float) -> None:
@@ -152,7 +152,7 @@ def board_of(arm: Arm, *, rehearsal: bool = False) -> Board:
 
 
 def arm_for_port(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
-    """The arm for a port: on `sim` alone with motors and rates that its file does not state, which are named."""
+    """The arm for a port; on `sim` with assumed motors and rates where its file has none, and a note of them."""
     if port != SIM:
         return arm
     from armkin.board.backend.assumptions import arm_with_assumptions
@@ -165,7 +165,7 @@ def arm_for_port(arm: Arm, port: str | None, *, quiet: bool = False) -> Arm:
 
 
 def arm_for_plan(arm: Arm) -> Arm:
-    """The arm for a plan that moves nothing: with rates that its file does not state, which are named."""
+    """The arm for a mere plan, with assumed rates where its file has none, and a note of them."""
     from armkin.board.backend.assumptions import with_rates
 
     arm, made_up = with_rates(arm)
@@ -176,17 +176,17 @@ def arm_for_plan(arm: Arm) -> Arm:
 
 
 def simulation_note(assume: str | None) -> str:
-    """What to say of a board in this process, which knows no position before."""
+    """The note for a simulated board, which starts without a position."""
     return AT_HOME if assume in (None, "home") else "the simulated board forgets all at the end"
 
 
 def assumed_joints(arm: Arm, text: str | None) -> Array | None:
-    """`--assume`: joint values (n,) [rad | mm] where a lost arm stands, which are within its limits."""
+    """`--assume`: joint values (n,) [rad | mm] of a lost arm, within its limits."""
     return None if text is None else standing_joints(arm, text, "--assume")
 
 
 def standing_joints(arm: Arm, text: str, option: str) -> Array:
-    """Joint values (n,) [rad | mm] where an arm stands or a plan begins; NoSolutionError outside its limits."""
+    """Joint values (n,) [rad | mm] of an option. Raises NoSolutionError outside the limits."""
     from armkin.model.limits import check_limits
 
     q: Array = units.joints_in(arm, arguments.joint_list(arm, text, option))
@@ -198,19 +198,19 @@ def standing_joints(arm: Arm, text: str, option: str) -> Array:
 
 
 def prepare_motion(arm: Arm, machine: Backend, text: str | None, assume: Array | None) -> None:
-    """Get the board ready to move; says so if it takes the arm to stand somewhere on the operator's word."""
+    """Get the board ready to move, with a note if it sets a lost position as the operator states it."""
     if machine.prepare(assume=assume) and text is not None:
         place_text = f"in its pose {text}" if text in arm.poses else f"at {text}"
         output.note(f"the board takes the arm to stand {'in its home pose' if text == 'home' else place_text}")
 
 
 def where_text(arm: Arm, answer: Mapping[str, Any]) -> str:
-    """What `armkin.board.planner.where_arm_stands` has found, as tables."""
+    """The answer of `armkin.board.planner.where_arm_stands` as tables."""
     from armkin.motors import motor_names, pulse_units
 
     if answer["joints"] is None:
-        why = answer.get("lost_because")
-        return f"{arm.name}: its position is lost{f' ({why})' if why else ''}\n"
+        reason = answer.get("lost_because")
+        return f"{arm.name}: its position is lost{f' ({reason})' if reason else ''}\n"
     head = [f"{name}/{unit}" for name, unit in zip(motor_names(arm), pulse_units(arm), strict=True)]
     tables = [
         render.row("joints", render.joint_headings(arm), [render.fixed_text(value) for value in answer["joints"]]),

@@ -22,8 +22,8 @@ from armkin.errors import FileError, UsageError
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
 
-PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
-MAX_LINE = 100_000  # characters of a line, at most: what is longer is no CSV file
+PYARROW_ROWS = 2_000  # fewest rows that justify the import of pyarrow
+MAX_LINE = 100_000  # longest line of a CSV file
 CHUNK_CHARACTERS = 1 << 18  # characters read at once
 _PLAIN = b"0123456789+-.eE,\r\n \t"
 _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
@@ -134,7 +134,7 @@ def batch_rows(
     names, what, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
-    files.protect_input(0 if source == "-" else source)  # before an output of that name is opened
+    files.protect_input(0 if source == "-" else source)  # must precede the opening of an output of that name
     return _all_rows(source, names, purpose, named)
 
 

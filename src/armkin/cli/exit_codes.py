@@ -61,8 +61,8 @@ def _other_command(name: str, words: list[str]) -> str:
     """What to type in place of a word that is no command."""
     if words and words[0] in COMMANDS:
         return f"the command comes first: armkin {words[0]} {name} ..."
-    close = get_close_matches(name.lower(), COMMANDS, 1)
-    return f"did you mean {close[0]}?" if close else "armkin --help lists them"
+    matches = get_close_matches(name.lower(), COMMANDS, 1)
+    return f"did you mean {matches[0]}?" if matches else "armkin --help lists them"
 
 
 def _os_error(error: OSError) -> int:

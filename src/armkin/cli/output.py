@@ -1,4 +1,4 @@
-"""Where things go: data to stdout or a file, messages to stderr, progress to a terminal only."""
+"""Destinations of output: data to stdout or a file, messages to stderr, progress to a terminal only."""
 
 import math
 import os
@@ -164,10 +164,10 @@ def _print_line(text: str) -> None:
         print(text.encode("utf-8", "backslashreplace").decode(), file=sys.stderr, flush=True)
 
 
-def _printable_text(line: str, most: int) -> str:
+def _printable_text(line: str, max_length: int) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
     text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
-    return text if len(text) <= most else f"{text[: most - 90]} ... {text[-80:]}"
+    return text if len(text) <= max_length else f"{text[: max_length - 90]} ... {text[-80:]}"
 
 
 def _is_coloured(stream: TextIO) -> bool:

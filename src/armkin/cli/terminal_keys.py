@@ -1,4 +1,4 @@
-"""Keys of a terminal, one at a time, and whether one is held: a terminal tells of a held key by sending it again."""
+"""Reads single keys of a terminal, and detects held keys, which a terminal repeats."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from contextlib import contextmanager
 from armkin.cli import output
 from armkin.errors import UsageError
 
-_FIRST_REPEAT_TIME = 0.8  # time [s] after which a held key is sent again at the latest, on every system's default
-_REPEAT_PERIOD = 0.25  # time [s] between two repeats of a held key, at most
-_POLL_TIME = 0.01  # time [s] that one look takes
+_FIRST_REPEAT_TIME = 0.8  # longest time [s] to the first repeat of a held key, on any system
+_REPEAT_PERIOD = 0.25  # longest time [s] between two repeats
+_POLL_TIME = 0.01  # time [s] of one poll
 _ARROWS = {"[C": "+", "[A": "+", "[D": "-", "[B": "-", "OC": "+", "OA": "+", "OD": "-", "OB": "-"}
 _ARROWS_WINDOWS = {"M": "+", "H": "+", "K": "-", "P": "-"}
 
 
 class Keys:
-    """Somebody at a terminal."""
+    """The operator at a terminal."""
 
     def __init__(self, poll: Callable[[float], str]) -> None:
         """poll: the next key that comes within so many seconds, else an empty text."""
         self._poll = poll
-        self._next_key = ""  # a key that came while another one was held
+        self._next_key = ""  # a key that was pressed while another one was held
 
     def say(self, text: str) -> None:
         """A line to read."""

@@ -1,4 +1,4 @@
-"""Numbers that look like metres or radians: a note on stderr, never a refusal."""
+"""Notes on stderr for numbers that look like metres or radians."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file import RobotFile
 
-_TINY_REACH = 2.0  # distance [mm]: a target this near to the base, or an arm this short, was meant in metres
-_MAX_RADIANS = 3.2  # angle [deg]: a little more than pi
-_BIG_REACH = 50.0  # reach [mm] of an arm whose file is certainly in mm
+_TINY_REACH = 2.0  # a target this near to the base, or an arm this short [mm], is probably in metres
+_MAX_RADIANS = 3.2  # angle [deg] a little above pi
+_BIG_REACH = 50.0  # smallest reach [mm] of an arm whose file is certainly in mm
 _TURN_ANGLES = (math.pi / 2, math.pi)
 
 
@@ -54,8 +54,8 @@ def _is_turn(angle: float) -> bool:
 
 def joint_values(arm: Arm, values: Sequence[float], source: str = "joint values") -> None:
     """Joint values that are all below pi, with digits after the point; source: where they stand."""
-    turning = [value for value, sliding in zip(values, arm.prismatic, strict=True) if not sliding]
-    if not turning or max(map(abs, turning)) > _MAX_RADIANS or not any(_has_digits(value) for value in turning):
+    rotary = [value for value, prismatic in zip(values, arm.prismatic, strict=True) if not prismatic]
+    if not rotary or max(map(abs, rotary)) > _MAX_RADIANS or not any(_has_digits(value) for value in rotary):
         return
     output.note(f"{source} are degrees, and these look like radians ({', '.join(f'{value:g}' for value in values)})")
 

@@ -89,7 +89,7 @@ def export(
 
 
 def _one_chosen(kinds: dict[str, bool]) -> str:
-    """The only option that was given, of these; UsageError if there are none or several."""
+    """The only given option of these. Raises UsageError for none or several."""
     chosen = [name for name, is_chosen in kinds.items() if is_chosen]
     if len(chosen) != 1:
         listed = ", ".join(kinds)

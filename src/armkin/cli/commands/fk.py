@@ -82,7 +82,7 @@ def fk(
 
 @dataclass(frozen=True)
 class FkQuestions:
-    """What is asked of each row of a batch."""
+    """The questions of `fk` for each row of a batch."""
 
     arm: Arm
     frames: bool

@@ -186,7 +186,7 @@ def _decimal_rounding(arm: Arm, task: Task, values: Array, decimals: list[list[i
 
 @dataclass
 class IkQuestions:
-    """What is asked of each row of a batch; continuous: each is compared with the one before."""
+    """The questions of `ik` for each row of a batch; continuous: each row uses the last one's answer."""
 
     request: choose_branch.Request
     task: Task
@@ -218,7 +218,7 @@ class IkQuestions:
 
     @property
     def near(self) -> list[float] | None:
-        """Where the next row goes on [deg | mm]; None: each row by itself."""
+        """Joint values [deg | mm] for the next row; None: rows are independent."""
         return self.request.near_out if self.continuous else None
 
     @near.setter

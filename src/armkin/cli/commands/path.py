@@ -186,7 +186,7 @@ def _plan_from(
     *,
     json: bool,
 ) -> PathPlan:
-    """The plan from where an option says that the arm stands: nothing moves."""
+    """Print the plan from the joint values of an option, without motion."""
     arm = board_link.arm_for_plan(arm)
     if start is not None:
         options["start"] = board_link.standing_joints(arm, start, option)
@@ -204,7 +204,7 @@ def _carry_out_path(
     *,
     json: bool,
 ) -> None:
-    """Plan from where the arm stands (or where the motion that is resumed began), then move it."""
+    """Plan from the arm's position, or from the start of a resumed motion, then move."""
     from armkin.board import path_run
     from armkin.board.planner import where_arm_stands
     from armkin.board.stop_signals import planning
@@ -222,13 +222,13 @@ def _carry_out_path(
             plan = _make_plan(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
-            laid = path_run.lay_parts(plan, began, board.lay)
+            parts = path_run.lay_parts(plan, began, board.lay)
             _write_files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
-        with board.under_way(laid, held) as (left, first, note), board_link.motion_progress(left, note) as tell:
+        with board.under_way(parts, held) as (left, first, note), board_link.motion_progress(left, note) as tell:
             path_run.follow_plan(board, plan, left, tell, first, ask=_until_enter)
-        answer = {**_answer(plan, laid), "port": machine.port.name, **where_arm_stands(machine)}
+        answer = {**_answer(plan, parts), "port": machine.port.name, **where_arm_stands(machine)}
         if held is not None:
             answer.pop("approach", None)  # where it began, that motion is over
     _print_answer(plan, answer, json=json, out=out)
@@ -267,10 +267,10 @@ def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:
     return comma_separated(text, short if text.count(",") + 1 == len(short) else labels, "--via")
 
 
-def _number_from(text: str, option: str, least: float) -> float:
+def _number_from(text: str, option: str, minimum: float) -> float:
     value = number(text, option)
-    if value < least:
-        raise UsageError(f"{option}: '{text}' must be at least {least:g}")
+    if value < minimum:
+        raise UsageError(f"{option}: '{text}' must be at least {minimum:g}")
     return value
 
 
@@ -293,7 +293,7 @@ def _make_plan(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str
 
 
 def _lay_rehearsal(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] | None:
-    """The plan on the robot file's board, or on one that is made up; None without drives.
+    """The plan on the robot file's board, or on a made-up one; None without drives.
 
     rehearsal: a gripper that could not do its part is refused, too.
     """

@@ -115,9 +115,9 @@ def _grid_settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, A
 
 def _no_place(places: Sequence[Place], targets: str) -> NoSolutionError:
     """How many of the targets are reached where no place reaches all."""
-    most = max(places, key=lambda candidate: int(candidate.reached.max()))
+    best = max(places, key=lambda candidate: int(candidate.reached.max()))
     return NoSolutionError(
-        f"no place reaches all {most.of} {targets}; {most.arm.name} reaches {int(most.reached.max())} at best"
+        f"no place reaches all {best.of} {targets}; {best.arm.name} reaches {int(best.reached.max())} at best"
     )
 
 
@@ -142,7 +142,7 @@ def _answer(place: Place) -> PlacedRobot:
     from armkin.model.units import DEGREE
 
     i, j, k = place.best
-    best: BestPlace = {
+    best_place: BestPlace = {
         "xyz": place.xyz.tolist(),
         "yaw_deg": round(float(place.yaw[k] / DEGREE), 9),
         "reached": int(place.reached[i, j, k]),
@@ -150,9 +150,9 @@ def _answer(place: Place) -> PlacedRobot:
         "margin_mm": float(place.margin[i, j, k]),
     }
     if place.held:
-        best["held"] = _held_values(place)
+        best_place["held"] = _held_values(place)
     counts = {"places": place.reached.size, "reach_all": place.reach_all}
-    answer = cast("PlacedRobot", {**render.head(place.arm), "best": best, **counts})
+    answer = cast("PlacedRobot", {**render.head(place.arm), "best": best_place, **counts})
     if place.planned:
         answer["planned"] = [_planned_json(place, plan) for plan in place.planned]
     return answer

@@ -76,7 +76,7 @@ def pulses(
 
 @dataclass(frozen=True)
 class PulseQuestions:
-    """What is asked of each row of a batch."""
+    """The questions of `pulses` for each row of a batch."""
 
     arm: Arm
     origin: list[float]

@@ -101,12 +101,17 @@ def _servos_text(answer: dict[str, Any]) -> str:
 
 
 def _grbl_text(answer: dict[str, Any]) -> str:
-    wrong = answer["settings"]
+    differences = answer["settings"]
     rows = [
         ["board", f"{answer['board']} on {answer['port']}, {answer['firmware']}"],
         ["state", answer["state"]],
         ["active inputs", answer["inputs"] or "none"],
-        ["settings", f"{len(wrong)} differ from the robot file: armkin setup tells" if wrong else "fit the robot file"],
+        [
+            "settings",
+            f"{len(differences)} differ from the robot file: armkin setup tells"
+            if differences
+            else "fit the robot file",
+        ],
     ]
     return render.table(rows, left_aligned=(0, 1)) + "\n"
 

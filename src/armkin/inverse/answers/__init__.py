@@ -1,7 +1,7 @@
-"""What a user gets.
+"""The answers of inverse kinematics.
 
-batch.py      arrays of all targets, as the solvers fill them
-solutions.py  the answer
-rounding.py   how far a target's numbers may be off
-closest.py    the nearest legal pose when there is no branch
+batch.py      arrays for all targets, which the solvers fill
+solutions.py  the answer of `armkin.ik`
+rounding.py   the rounding error of a target's numbers
+closest.py    the nearest legal pose of a target without a branch
 """

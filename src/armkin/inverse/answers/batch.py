@@ -1,4 +1,4 @@
-"""What a batch is asked, and its results as the solvers fill them: how rows are written, packed and widened."""
+"""The goals of a batch, and the arrays of its results, with functions that write, pack and widen their rows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ OWN_LABEL = -1  # label of a posture that comes from `near`
 
 
 class Goals(NamedTuple):
-    """What is asked of a solver: targets (N, m) or (N, 4, 4) of a task, and the postures to stay close to (N, n)."""
+    """The input of a solver: targets (N, m) or (N, 4, 4) of a task, and the postures to stay close to (N, n)."""
 
     arm: Arm
     task: Task
@@ -33,9 +33,9 @@ class Goals(NamedTuple):
 class Seeds(NamedTuple):
     """Candidate branches of K targets.
 
-    q: (K, B, n), nan where there is none. loose: (K, B) those that depend on a value preferred for a free joint.
-    label: (K, B) of the solver's own numbering. sure: (K, B, n) joints that move along those that are known to
-    lie on a self-motion, one posture of each. simple: (K, B) branches as they stand: no closed form doubts them.
+    q: (K, B, n), nan for none. loose: (K, B) whether a candidate depends on the value preferred for a free joint.
+    label: (K, B) in the solver's own numbering. sure: (K, B, n) joints that move along a known self-motion, for one
+    posture of each. simple: (K, B) branches that need no examination, as no closed form doubts them.
     """
 
     q: Array
@@ -46,19 +46,19 @@ class Seeds(NamedTuple):
 
     @classmethod
     def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
-        """Candidates of which no self-motion is known; by default none is loose, and none is simple."""
+        """Candidates without a known self-motion; by default none is loose and none is simple."""
         none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
         sure = np.zeros(q.shape, bool)
         return cls(q, none if loose is None else loose, label, sure, none if simple is None else simple)
 
 
 class Examined(NamedTuple):
-    """What is known of K targets.
+    """The result of examining K targets.
 
-    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) the branch that a posture is, of the
-    solver's own numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried,
-    and whether a self-motion is a surface.  moved: (K, n) joints that move along self-motions other than those of which
-    all is known.  beyond: (K,) all that is near lies beyond a fold.
+    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) branch of each posture in the solver's own
+    numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried, and whether a
+    self-motion is a surface.  moved: (K, n) joints that move along self-motions that are not fully known.  beyond: (K,)
+    whether all nearby roots lie beyond a fold.
     """
 
     q: Array
@@ -85,13 +85,13 @@ class Batch(NamedTuple):
 
 
 def empty_batch(N: int, B: int, n: int) -> Batch:
-    """Room for N targets with B branches of n joints, written by whoever solves them."""
+    """Arrays for N targets with B branches of n joints, which the solver fills."""
     valid, within = np.empty((2, N, B), bool)
     branch, status, free = np.empty((N, B), np.int8), np.zeros(N, np.int8), np.zeros((N, n), bool)
     return Batch(np.empty((N, B, n)), valid, within, branch, status, free, np.ones(N, bool))
 
 
-Text = tuple[tuple[str, ...], str, str]  # of an answer: `Solutions.names`, method and why
+Text = tuple[tuple[str, ...], str, str]  # `Solutions.names`, method and why
 
 
 def as_solutions(
@@ -106,8 +106,8 @@ def as_solutions(
 
 
 def write_branches(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, label: Int, near: Array) -> Batch:
-    """Write branches (K, W, n) of some targets, with labels (K, W) as `complete_labels`, at their nearest legal copies,
-    nan behind; the same batch, or where they need more columns a wider one."""
+    """Write branches (K, W, n) of some targets, with labels (K, W) of `complete_labels`, at their nearest legal copies
+    and nan behind them; returns the same batch, or a wider one if they need more columns."""
     if q.shape[1] > batch.q.shape[1]:
         batch = stack_rows([batch, empty_batch(0, q.shape[1], arm.n)])
     width, label = q.shape[1], np.where(valid, label, -1)
@@ -125,23 +125,23 @@ def write_branches(arm: Arm, batch: Batch, rows: Int, q: Array, valid: Bool, lab
 
 
 def complete_labels(label: Int, valid: Bool) -> Int:
-    """Labels (K, W) with the smallest free number for branches that have none, or one of another."""
-    out = np.where(valid, label, -1)
-    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(out, axis=1)) == 0).any(axis=1)):
-        taken: set[int] = set()
+    """Labels (K, W) in which branches without a label, or with a duplicate one, get the smallest unused number."""
+    fixed = np.where(valid, label, -1)
+    for row in np.flatnonzero(((label < 0) & valid).any(axis=1) | (np.diff(np.sort(fixed, axis=1)) == 0).any(axis=1)):
+        used: set[int] = set()
         for b in np.flatnonzero(valid[row]):
-            if out[row, b] < 0 or out[row, b] in taken:
-                out[row, b] = next(i for i in range(out.shape[1] + len(taken) + 1) if i not in {*taken, *out[row]})
-            taken.add(int(out[row, b]))
-    return out
+            if fixed[row, b] < 0 or fixed[row, b] in used:
+                fixed[row, b] = next(i for i in range(fixed.shape[1] + len(used) + 1) if i not in {*used, *fixed[row]})
+            used.add(int(fixed[row, b]))
+    return fixed
 
 
 def pack_branches(part: Batch, count: Int) -> None:
-    """Move the branches of targets, count (N,) of them, to the front, nan behind."""
-    B, most = part.valid.shape[1], int(count.max(initial=0))
-    rows = np.flatnonzero(count < most)
+    """Move the branches of every target, count (N,) of them, to the front, with nan behind."""
+    B, columns = part.valid.shape[1], int(count.max(initial=0))
+    rows = np.flatnonzero(count < columns)
     front = np.arange(B) < count[rows, None]
-    # the order of a target's branches; the index behind the last one stands for a place that stays empty
+    # source index of each entry; the index behind the last one stands for an empty place
     source = np.full(front.size, front.size)
     source[np.flatnonzero(front)] = np.flatnonzero(part.valid[rows])
     arrays = (part.q, np.nan), (part.within, False), (part.branch, -1)
@@ -151,12 +151,12 @@ def pack_branches(part: Batch, count: Int) -> None:
         array.take(rows, axis=0, out=padded[:-1].reshape(len(rows), B, *width), mode="clip")
         padded[-1] = missing
         array[rows] = padded.take(source, axis=0).reshape(len(rows), B, *width)
-    if most < B:  # the others' rows are taken as slices
-        part.valid[rows] = np.arange(B) < most
+    if columns < B:  # full rows are moved as slices
+        part.valid[rows] = np.arange(B) < columns
         present = np.flatnonzero(part.valid)
         for array, missing in arrays:
             width = array.shape[2:]
-            array[:, :most] = array.reshape(-1, *width).take(present, axis=0).reshape(len(count), most, *width)
-            array[:, most:] = missing
-        part.valid[...] = np.arange(B) < most
+            array[:, :columns] = array.reshape(-1, *width).take(present, axis=0).reshape(len(count), columns, *width)
+            array[:, columns:] = missing
+        part.valid[...] = np.arange(B) < columns
     part.valid[rows] = front

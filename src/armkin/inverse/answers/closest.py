@@ -19,12 +19,12 @@ from armkin.inverse.tasks.task import Task, read_targets, targets_of
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-POOL = 4000  # postures within limits of which each target starts from the nearest
-STARTS = 14  # postures from which the distance to one target is minimised
-STEPS = 10  # iterations, at most, of `closest_from_every_start`
-Rounds = tuple[tuple[int, int], ...]  # steps, and how many starts go on after them
-ROUNDS: Rounds = (3, 6), (7, 3)  # iterations of each round of one target, and the postures that it works on
-AT_ONCE = 256  # targets worked on together
+POOL = 4000  # random postures within limits; each target starts from the nearest of them
+STARTS = 14  # starts taken from the pool for each target
+STEPS = 10  # most iterations of `closest_from_every_start`
+Rounds = tuple[tuple[int, int], ...]  # iterations of a round, and starts kept after it
+ROUNDS: Rounds = (3, 6), (7, 3)  # rounds for each target
+AT_ONCE = 256  # targets in one call
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +83,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
 def closest_each(
     arm: Arm, targets: ArrayLike, task: str | None = None, *, near: ArrayLike | None = None
 ) -> list[Closest]:
-    """What `closest` says of each of many targets (N, m) or (N, 4, 4); near: (n,) or (N, n)."""
+    """`closest` for each of many targets (N, m) or (N, 4, 4); near: (n,) or (N, n)."""
     definition = task_for(arm, task)
     goal, *_ = read_targets(definition, targets)
     reference = np.broadcast_to(arm.home if near is None else np.asarray(near, float), (len(goal), arm.n))
@@ -101,34 +101,34 @@ def _of_chunk(arm: Arm, task: Task, target: Array, near: Array, rounds: Rounds =
     N, n = near.shape
     pool, features = _pool(arm, task)
     goal = _target_features(arm, task, target)
-    apart = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # the goal's own square changes no order
-    nearest = np.argpartition(apart, STARTS, axis=1)[:, :STARTS]
+    distances = (features * features).sum(axis=1) - 2.0 * (goal @ features.T)  # the goal's square keeps the order
+    nearest = np.argpartition(distances, STARTS, axis=1)[:, :STARTS]
     nearest.sort(axis=1)
     home = np.broadcast_to(np.clip(arm.home, arm.lower, arm.upper), (N, 1, n))
     starts = np.concatenate([np.clip(near, arm.lower, arm.upper)[:, None], home, pool[nearest]], axis=1)
-    for steps, going in rounds:
-        every = starts.shape[1]
-        goals = np.repeat(target, every, axis=0)
+    for steps, kept in rounds:
+        count = starts.shape[1]
+        goals = np.repeat(target, count, axis=0)
         q = _descend_by_damped_steps(arm, task, starts.reshape(-1, n).copy(), goals, steps)
-        order = np.argsort(_cost(arm, task, q, goals).reshape(N, every), axis=1, kind="stable")[:, :going]
-        starts = np.take_along_axis(q.reshape(N, every, n), order[:, :, None], axis=1)
-    goals = np.repeat(target, going, axis=0)
+        order = np.argsort(_cost(arm, task, q, goals).reshape(N, count), axis=1, kind="stable")[:, :kept]
+        starts = np.take_along_axis(q.reshape(N, count, n), order[:, :, None], axis=1)
+    goals = np.repeat(target, kept, axis=0)
     q, converged = _finish_by_newton(arm, task, starts.reshape(-1, n), goals)
-    cost = _cost(arm, task, q, goals).reshape(N, going)
-    moved = np.abs((q.reshape(N, going, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
+    cost = _cost(arm, task, q, goals).reshape(N, kept)
+    motion = np.abs((q.reshape(N, kept, n) - near[:, None]) / radian_or_reach(arm)).sum(axis=2)
     equal = cost <= cost.min(axis=1, keepdims=True) * (1 + tol.EQUAL_COST) + tol.NO_COST
-    best = np.arange(N) * going + np.where(equal, moved, np.inf).argmin(axis=1)
+    best = np.arange(N) * kept + np.where(equal, motion, np.inf).argmin(axis=1)
     T = fk(arm, q[best])
-    missing, p = residual(task, T, q[best], target), task.position
+    residuals, p = residual(task, T, q[best], target), task.position
     return [
         Closest(
-            q=q[k],
+            q=q[row],
             position=T[i, :3, 3],
-            distance=float(np.linalg.norm(missing[i, :p])),
-            angle=float(np.linalg.norm(missing[i, p:])),
-            converged=bool(converged[k]),
+            distance=float(np.linalg.norm(residuals[i, :p])),
+            angle=float(np.linalg.norm(residuals[i, p:])),
+            converged=bool(converged[row]),
         )
-        for i, k in enumerate(best)
+        for i, row in enumerate(best)
     ]
 
 
@@ -142,13 +142,13 @@ def random_postures(arm: Arm, rng: np.random.Generator, count: int) -> Array:
 
 @lru_cache(maxsize=16)
 def _pool(arm: Arm, task: Task) -> tuple[Array, Array]:
-    """Postures spread within limits (P, n), and what is compared of them with targets: see `_target_features`."""
+    """Random postures within limits (P, n), and their features for the comparison with targets."""
     q = random_postures(arm, np.random.default_rng(11), POOL)
     return q, _target_features(arm, task, targets_of(task, fk(arm, q), q))
 
 
 def _target_features(arm: Arm, task: Task, target: Array) -> Array:
-    """Numbers (N, f) of targets whose distance is about that of what is minimised."""
+    """Features (N, f) of targets, whose squared distance approximates the minimised cost."""
     full = task.orientation == "full"
     point = target[:, :3, 3] if full else target[:, : task.position]
     sums = target[:, task.position : task.position + len(task.sums)] if not full else np.zeros((len(target), 0))
@@ -175,14 +175,14 @@ def _downhill_direction(arm: Arm, task: Task, q: Array, target: Array) -> Array:
 
 
 def _stopped_joints(arm: Arm, q: Array, downhill: Array) -> Bool:
-    """Joints that stand on a limit and would go beyond."""
+    """Whether a joint stands at a limit and would move beyond it."""
     return ((q <= arm.lower) & (downhill < 0)) | ((q >= arm.upper) & (downhill > 0))
 
 
 def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Bool]:
     """Newton's method with the full Hessian (differences of the gradient), and whether a minimum was reached.
 
-    Far beyond the reach the residual is large and Levenberg-Marquardt alone creeps.
+    Levenberg-Marquardt alone converges slowly far beyond the reach, where the residual is large.
     """
     n, unit = arm.n, radian_or_reach(arm)
     shifts = np.concatenate([np.eye(n), -np.eye(n)]) * tol.GRADIENT_WAY * unit
@@ -192,33 +192,33 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         points, goal = q[active], target[active]
         downhill = _downhill_direction(arm, task, points, goal)
         free = ~_stopped_joints(arm, points, downhill)
-        around = (points[:, None, :] + shifts).reshape(-1, n)
-        slopes = _downhill_direction(arm, task, around, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
+        nearby = (points[:, None, :] + shifts).reshape(-1, n)
+        slopes = _downhill_direction(arm, task, nearby, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
         H = -(slopes[:, 0] - slopes[:, 1]) / (2 * tol.GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         free_pairs = free[:, :, None] & free[:, None, :]
         values, vectors = np.linalg.eigh(np.where(free_pairs, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        arrived = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
-        converged[active] = arrived
-        active, left = active[~arrived], np.flatnonzero(~arrived)
+        is_minimum = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
+        converged[active] = is_minimum
+        active, rows_left = active[~is_minimum], np.flatnonzero(~is_minimum)
         if not len(active):
             break
-        # each eigenvector gets a step downhill, whichever way it curves; where it is flat, a short one
-        values, vectors = values[left], vectors[left]
-        along = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[left])
-        step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_VALUE))
+        # a step downhill along each eigenvector, whatever its curvature; a short one where it is flat
+        values, vectors = values[rows_left], vectors[rows_left]
+        components = np.einsum("mij,mi->mj", vectors, np.where(free, downhill, 0.0)[rows_left])
+        step = np.einsum("mij,mj->mi", vectors, components / np.maximum(np.abs(values), tol.LEVEL_VALUE))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
-        waiting = np.arange(len(active))
+        pending = np.arange(len(active))
         for shrink in (1.0, 0.25, 0.05, tol.SHORTENED):
-            rows = active[waiting]
-            trial = np.clip(q[rows] + shrink * step[waiting] * unit, arm.lower, arm.upper)
+            rows = active[pending]
+            trial = np.clip(q[rows] + shrink * step[pending] * unit, arm.lower, arm.upper)
             new_cost = _cost(arm, task, trial, target[rows])
-            # a cost that rounding alone tells from the last is accepted: the gradient may still vanish along it
-            better = new_cost <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
-            q[rows[better]], cost[rows[better]] = trial[better], new_cost[better]
-            waiting = waiting[~better]
-            if not len(waiting):
+            # accept a cost equal to rounding, since the gradient may still decrease
+            accepted = new_cost <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
+            q[rows[accepted]], cost[rows[accepted]] = trial[accepted], new_cost[accepted]
+            pending = pending[~accepted]
+            if not len(pending):
                 break
     return q, converged
 
@@ -232,21 +232,21 @@ def _descend_by_damped_steps(arm: Arm, task: Task, q: Array, target: Array, step
     for _ in range(steps):
         r, J = _weighted_residual(arm, task, q[active], target[active])
         downhill = (r[:, None] @ J)[:, 0]
-        held = _stopped_joints(arm, q[active], downhill)
-        J = np.where(held[:, None, :], 0.0, J)
+        at_limit = _stopped_joints(arm, q[active], downhill)
+        J = np.where(at_limit[:, None, :], 0.0, J)
         H = J.swapaxes(1, 2) @ J + damping[active][:, None, None] * np.eye(arm.n)
-        step = np.linalg.solve(H, np.where(held, 0.0, downhill)[:, :, None])[:, :, 0]
+        step = np.linalg.solve(H, np.where(at_limit, 0.0, downhill)[:, :, None])[:, :, 0]
         step *= np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         trial = np.clip(q[active] + step * unit, arm.lower, arm.upper)
         new_cost = _cost(arm, task, trial, target[active])
-        better = new_cost < cost[active]
-        gained = cost[active] - new_cost
+        improved = new_cost < cost[active]
+        gain = cost[active] - new_cost
         size = np.abs(trial - q[active]).max(axis=1)
-        q[active[better]] = trial[better]
-        cost[active[better]] = new_cost[better]
-        damping[active] = np.where(better, np.maximum(damping[active] * 0.2, tol.MIN_DAMPING), damping[active] * 6.0)
-        little = gained <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.MIN_COST)
-        idle = better & little & (size < tol.LAST_STEP)
+        q[active[improved]] = trial[improved]
+        cost[active[improved]] = new_cost[improved]
+        damping[active] = np.where(improved, np.maximum(damping[active] * 0.2, tol.MIN_DAMPING), damping[active] * 6.0)
+        is_small_gain = gain <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.MIN_COST)
+        idle = improved & is_small_gain & (size < tol.LAST_STEP)
         ended = idle | (damping[active] > 1e8)
         active = active[~ended]
         if not len(active):

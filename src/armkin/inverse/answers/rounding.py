@@ -1,7 +1,7 @@
-"""How far a target's numbers may be off by their rounding: what `near` may miss and still stand there.
+"""The rounding error of a target's numbers, within which `near` counts as a solution of the target.
 
-An arm that is asked for its own pose, printed in six digits or kept in float32, is asked for another pose: near a
-singular posture the exact answer to that one is far away: docs/solution.md, "Rounded targets".
+A pose that was printed in six digits or kept in float32 differs from the arm's own pose. Near a singular posture the
+exact answer to the rounded pose is far from the arm's posture: docs/solution.md, "Rounded targets".
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import ROUNDED, Task
 from armkin.model.arm import Arm
 
-# A rotation's defect is the symmetric part of its error, what `near` misses the antisymmetric one, of the same size:
-# the defect of nine rounded entries is less than a quarter of it in one case of 100,000, of a turn about one of the
-# base's axes, which has four, in one of 13. There the last digit that the entries have tells: an angle is off by less
-# than three halves of it, a position of as many digits, beside the reach, by some eleven. A rotation of whole numbers,
-# by right angles about the base's axes, shows nothing: only the position's last digit tells there.
-DEFECTS = 4.0  # bound of a rounded target's error, in defects of its rotation
-HALVES = 12.0  # bound of a rounded target's error, in halves of the last digit of its rotation
-MIN_DIGITS = 5  # digits, at least, of a matrix's entries: one of fewer is no rotation to that many
-PRINTED = 6  # digits, at least, that a position is printed with; zeros at its end show fewer
-ROWS = 2_048  # rows worked on at once: all their arrays fit the cache
-MIN_DECIMALS, MAX_DECIMALS = 3, 12  # printed decimals that count as rounded, and as exact
+# The defect of a rounded rotation is the symmetric part of its error. The residual of `near` is the antisymmetric
+# part, of about the same size: with nine rounded entries it exceeds four defects in one case of 100,000, but for a turn
+# about an axis of the base, with four rounded entries, in one of 13. Then the last digit of the entries gives a bound:
+# an angle is off by less than three halves of it, and a position of as many digits by some eleven. A rotation by right
+# angles has whole numbers and shows no error, so only the position's last digit gives a bound there.
+DEFECTS = 4.0  # bound of the error in defects of the rotation
+HALVES = 12.0  # bound of the error in halves of the rotation's last digit
+MIN_DIGITS = 5  # fewest digits of entries; a matrix with fewer is no rotation to that accuracy
+PRINTED = 6  # fewest digits of a printed position, with zeros at its end
+ROWS = 2_048  # rows in one call, whose arrays fit the cache
+MIN_DECIMALS, MAX_DECIMALS = 3, 12  # fewest decimals that count as rounded, and fewest that count as exact
 
 
 def of_targets(
@@ -40,11 +40,11 @@ def of_targets(
     stated: ArrayLike | None,
     lead: tuple[int, ...],
 ) -> tuple[Array, Array]:
-    """The rounding of targets (N, ...), a batch of shape lead: (N,), and the residual that solves them (N,), both
+    """The rounding of targets (N, ...), a batch of shape lead, and the residual up to which they are solved: (N,) each
     [reaches, rad].
 
-    shown: targets as they were given, and how far their rotations were off (N,); single: they were given in float32;
-    stated: () or (...) what the caller says it is.
+    shown: targets as given, and the defects of their rotations (N,); single: they were given in float32; stated: () or
+    (...) the rounding that the caller states.
     Raises UsageError for a rounding that is negative, not finite or of another shape.
     """
     if stated is not None:
@@ -60,55 +60,55 @@ def of_targets(
         point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
         largest = np.abs(point).max(axis=1, initial=0.0) / arm.reach
         rounding = np.maximum(defect, tol.FLOAT32 * np.maximum(largest, 1.0 if task.orientation != "none" else 0.0))
-    most = DEFECTS * rounding
+    bound = DEFECTS * rounding
     rows = np.flatnonzero(defect > ROUNDED)
     if len(rows):
-        most[rows] = np.maximum(most[rows], HALVES * last_place(numbers[rows, :3, :3]))
+        bound[rows] = np.maximum(bound[rows], HALVES * last_place(numbers[rows, :3, :3]))
     if task.orientation == "full":
-        corner = numbers[:, 0, 0]  # tells nearly all others
+        corner = numbers[:, 0, 0]  # excludes nearly all other rotations
         rows = np.flatnonzero(np.abs(corner - np.rint(corner)) <= ROUNDED)
         R = numbers[rows, :3, :3]
         rows = rows[(np.abs(R - np.rint(R)) <= ROUNDED).all(axis=(1, 2))]
         if len(rows):
-            most[rows] = np.maximum(most[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
-    return rounding, tol.SOLUTION + most
+            bound[rows] = np.maximum(bound[rows], last_place_of_position(numbers[rows, :3, 3]) / arm.reach)
+    return rounding, tol.SOLUTION + bound
 
 
 def last_place_of_position(p: Array) -> Array:
-    """How far positions (N, 3) [mm] may be off (N,), by their digits or as float32; 0 where they are exact.
+    """The rounding error of positions (N, 3) [mm] by their digits or as float32: (N,); 0 for exact ones.
 
-    Typed ones are: of fewer than six digits, and fewer than three decimals.
+    Typed positions, with fewer than six digits and fewer than three decimals, are exact.
     """
-    p = np.where(np.abs(p) < tol.SOLUTION, 0.0, p)  # what is that small is rounding
+    p = np.where(np.abs(p) < tol.SOLUTION, 0.0, p)  # smaller numbers are rounding errors
     size = np.floor(np.log10(np.maximum(np.abs(p), tol.SOLUTION)))
     half = np.zeros(len(p))
     typed = _are_whole(p * 10.0 ** (MIN_DECIMALS - 1)) & _are_whole(p * 10.0 ** (PRINTED - 2 - size))
-    left = np.flatnonzero(~typed.all(axis=1))
+    pending = np.flatnonzero(~typed.all(axis=1))
     for digits in range(PRINTED, MAX_DECIMALS):
-        fits = _are_whole(p[left] * 10.0 ** (digits - 1 - size[left])).all(axis=1)
-        half[left[fits]] = 0.5 * 10.0 ** (size[left[fits]].max(axis=1) + 1 - digits)
-        left = left[~fits]
-    single = left[(p[left] == p[left].astype(np.float32)).all(axis=1)]
+        fits = _are_whole(p[pending] * 10.0 ** (digits - 1 - size[pending])).all(axis=1)
+        half[pending[fits]] = 0.5 * 10.0 ** (size[pending[fits]].max(axis=1) + 1 - digits)
+        pending = pending[~fits]
+    single = pending[(p[pending] == p[pending].astype(np.float32)).all(axis=1)]
     half[single] = tol.FLOAT32 * np.abs(p[single]).max(axis=1)
     return np.asarray(3.0**0.5 * half)
 
 
 def last_place(R: Array) -> Array:
-    """Half a unit (N,) of the last digit that rotations (N, 3, 3) are rounded to, or of float32; 0 where of neither.
+    """Half a unit (N,) of the last digit to which rotations (N, 3, 3) are rounded, or of float32; 0 for neither.
 
-    All nine entries have to be numbers of so few digits, or too small to count: of others the chance is 1e-20 at
-    eight. What is rounded to decimals has as many digits, or fewer.
+    All nine entries must be numbers of so few digits, or negligible; by chance that has a probability of 1e-20 at eight
+    digits. Entries that are rounded to decimals have as many digits or fewer.
     """
     entries = R.reshape(-1, 9)
     half = np.where((entries == entries.astype(np.float32)).all(axis=1), tol.FLOAT32, 0.0)
-    left = np.flatnonzero(half == 0.0)
+    pending = np.flatnonzero(half == 0.0)
     for digits in range(MIN_DIGITS, MAX_DECIMALS):
-        numbers = entries[left]
+        numbers = entries[pending]
         size = np.floor(np.log10(np.maximum(np.abs(numbers), tol.FEW_DIGITS)))
         fits = (_are_whole(numbers * 10.0 ** (digits - 1 - size)) | (np.abs(numbers) < tol.FEW_DIGITS)).all(axis=1)
-        half[left[fits]] = 0.5 * 10.0**-digits
-        left = left[~fits]
-        if not len(left):
+        half[pending[fits]] = 0.5 * 10.0**-digits
+        pending = pending[~fits]
+        if not len(pending):
             break
     return half
 
@@ -116,40 +116,40 @@ def last_place(R: Array) -> Array:
 def printed_rounding(units: Sequence[str], values: Array, reach: float, decimals: ArrayLike | None = None) -> Array:
     """The rounding (N,) [reaches, rad] of targets as they are printed, (N, m) in units ("mm", "deg", "").
 
-    Half the last decimal of each number that has three or more; 390 and 400.0 are exact. decimals (N, m): how many are
-    printed; by default as many as the row's number with most of them needs. Halves of lengths add as vectors, of
-    angles as sums: two of a pose's three may turn about nearly one axis.
+    It is half the last decimal of each number with three or more; 390 and 400.0 are exact. decimals (N, m): number of
+    printed decimals; by default the most that a number of the row needs. Errors of lengths add as vectors, errors of
+    angles as a sum, since two of a pose's three angles may turn about nearly the same axis.
     """
     values = np.asarray(values, float).reshape(-1, len(units))
-    if decimals is None:  # all numbers of a row have as many: there are no more sizes than decimals
+    if decimals is None:  # one size for each number of decimals, which all numbers of a row share
         sizes = printed_rounding(units, values[:0], reach, np.repeat(np.arange(MAX_DECIMALS)[:, None], len(units), 1))
         blocks = [_needed_decimals(values[start : start + ROWS]).max(axis=1) for start in range(0, len(values), ROWS)]
         return np.asarray(sizes[np.concatenate([np.zeros(0, np.intp), *blocks])])
     halves = _HALF.take(np.asarray(decimals, int).reshape(-1, len(units)), mode="clip")
     angles = np.array([unit == "deg" for unit in units])
     scale = np.array([1.0 / reach if unit == "mm" else 1.0 for unit in units])
-    turned = np.radians(halves[:, angles].sum(axis=1))
-    return np.asarray(np.hypot(np.linalg.norm((halves * scale)[:, ~angles], axis=1), turned))
+    angle_error = np.radians(halves[:, angles].sum(axis=1))
+    return np.asarray(np.hypot(np.linalg.norm((halves * scale)[:, ~angles], axis=1), angle_error))
 
 
-# half a unit of the last of so many decimals, 0 below MIN_DECIMALS; of more than 300 it is nothing, too
+# half a unit of the last decimal by the number of decimals; 0 below MIN_DECIMALS
 _HALF = np.where(np.arange(300) < MIN_DECIMALS, 0.0, 0.5 * 10.0 ** -np.arange(300.0))
 
 
 def _needed_decimals(values: Array) -> Int:
-    """How many decimals numbers (N, m) need: 0 below MIN_DECIMALS, and from MAX_DECIMALS on: those are not rounded."""
+    """The number of decimals of numbers (N, m); 0 below MIN_DECIMALS, and for exact ones from MAX_DECIMALS on."""
     needed = np.zeros(values.size, np.intp)
     number = values.ravel()
-    left = np.flatnonzero(~_are_whole(number * 10.0 ** (MIN_DECIMALS - 1)))
+    pending = np.flatnonzero(~_are_whole(number * 10.0 ** (MIN_DECIMALS - 1)))
     for decimals in range(MIN_DECIMALS, MAX_DECIMALS):
-        if not len(left):
+        if not len(pending):
             break
-        fits = _are_whole(number[left] * 10.0**decimals)
-        needed[left[fits]] = decimals
-        left = left[~fits]
+        fits = _are_whole(number[pending] * 10.0**decimals)
+        needed[pending[fits]] = decimals
+        pending = pending[~fits]
     return needed.reshape(values.shape)
 
 
 def _are_whole(scaled: Array) -> Bool:
-    """Which numbers are integers but for rounding."""
+    """Whether numbers are integers up to rounding errors."""
     return np.asarray(np.abs(scaled - np.rint(scaled)) <= tol.DECIMAL * np.maximum(np.abs(scaled), 1.0))

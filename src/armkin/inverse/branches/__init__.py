@@ -1,6 +1,6 @@
-"""What branches are called, which whole turn of theirs is wanted, and which continues which.
+"""Names of branches, their whole-turn copies, and branches along a path.
 
 names.py        "left elbow up"
-whole_turns.py  which copy of a joint value is legal and nearest; `turns`
+whole_turns.py  the nearest legal copy of a joint value; `turns`
 tracking.py     a branch's number along a path
 """

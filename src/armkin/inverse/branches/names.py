@@ -1,8 +1,8 @@
 """Names of branches: left or right, elbow up or down, wrist flipped or not.
 
-A branch of a closed form is one choice of sign on each branch axis; along a path of
-targets it keeps its sign, and so its name, until it merges with its neighbour. What a sign
-means is found once for each arm, by looking at postures:
+A branch of a closed form is one choice of sign on each branch axis. Along a path of targets
+it keeps its signs, and so its name, until it merges with its neighbour. Sample postures show
+once for each arm which sign has which name:
 
 - left: the shoulder on whose side the arm's home posture lies (it reaches to the front),
   right: reaching over its back;
@@ -10,7 +10,7 @@ means is found once for each arm, by looking at postures:
   base (for arms that bend in the base's plane: farther to the left of the way to the target);
 - no flip: the wrist's middle joint on the positive side of straight.
 
-General arms have no such words: their branches are numbered.
+The branches of general arms have no such words and are numbered.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from armkin.model.joint_chain import Chain, joint_axes
 from armkin.model.rotation import joint_motion
 
 WORDS = {"shoulder": ("left", "right"), "elbow": ("elbow up", "elbow down"), "wrist": ("no flip", "flip")}
-# what people also say, for `find_branches`
+# synonyms that `find_branches` accepts
 _SYNONYMS = {
     "left angle": "left", "right angle": "right", "front": "left", "back": "right", "lefty": "left", "righty": "right",
     "upper elbow": "elbow up", "lower elbow": "elbow down", "elbow upper": "elbow up", "elbow lower": "elbow down",
@@ -59,15 +59,15 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
 
 
 def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
-    """On which branches (b0, b1, b2) each word of the class has its second name for the first sign."""
+    """The branches (b0, b1, b2) on which the first sign has the second word, for each branch axis."""
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
-    away = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
-    found_again = away.min(axis=1) < tol.NAMED  # a branch that is the posture itself
+    distances = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
+    found_again = distances.min(axis=1) < tol.NAMED  # some branch is the posture itself
     swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
-    signs = np.stack(np.unravel_index(away.argmin(axis=1), shape[1:]), axis=1)  # (postures, 3) of that branch
+    signs = np.stack(np.unravel_index(distances.argmin(axis=1), shape[1:]), axis=1)  # (postures, 3) of that branch
     if "shoulder" in swap and found_again.any():
-        # the first posture found again is the one most like home
+        # the first of these postures is the one most like home
         swap["shoulder"][...] = signs[np.argmax(found_again), 0] == 1
     if "wrist" in swap and found_again.any():
         positive = found_again & (_bent_wrist(arm, postures) > 0)
@@ -79,20 +79,20 @@ def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -
 
 
 def _elbow_swapped(arm: Arm, q: Array, valid: Bool, shape: tuple[int, ...]) -> Bool:
-    """Where the second of two elbows is the upper one, (b0, b1, b2), of branches (M, B, n) on axes (M, b0, b1, b2)."""
+    """Whether the second of two elbows is the upper one, (b0, b1, b2); branches (M, B, n) on axes (M, b0, b1, b2)."""
     heights, level = _elbow_heights(arm, q)
     heights = np.where(valid, heights, np.nan).reshape(shape)
     level = np.where(valid, level, np.inf).reshape(shape)
     swapped = np.zeros(shape[1:], bool)
     for b0, b2 in itertools.product(range(shape[1]), range(shape[3])):
-        up, down = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
-        tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(up - down), np.inf, 0.0)
-        swapped[b0, :, b2] = down[np.argmin(tilt)] > up[np.argmin(tilt)]
+        first_height, second_height = heights[:, b0, 0, b2], heights[:, b0, 1, b2]
+        tilt = level[:, b0, :, b2].max(axis=1) + np.where(np.isnan(first_height - second_height), np.inf, 0.0)
+        swapped[b0, :, b2] = second_height[np.argmin(tilt)] > first_height[np.argmin(tilt)]
     return swapped
 
 
 def find_branches(names: tuple[str, ...], phrase: str) -> list[int]:
-    """Indices of the branches that a name means; its words may come in any order, and not all of them.
+    """Indices of the branches that a phrase names; it may have some of a name's words, in any order.
 
     Raises UsageError, which lists the names, if there are none.
 
@@ -110,7 +110,7 @@ def find_branches(names: tuple[str, ...], phrase: str) -> list[int]:
 
 
 def _branch_words(text: str) -> tuple[list[str], list[str]]:
-    """The words of branch names that a text holds, or synonyms of them, and what it holds besides."""
+    """The words of branch names, or of their synonyms, in a text, and its other words."""
     for synonym, meant in _SYNONYMS.items():
         text = f" {text} ".replace(f" {synonym} ", f" {meant} ").strip()
     parts = []
@@ -123,11 +123,11 @@ def _branch_words(text: str) -> tuple[list[str], list[str]]:
 
 
 def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, Array, Bool]:
-    """Some postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
+    """Sample postures (M, n), home and its neighbours first, and all branches at each: (M, B, n), valid (M, B)."""
     rng = np.random.default_rng(3)
     near_home = arm.home + rng.uniform(-0.35, 0.35, (24, arm.n)) * np.where(arm.prismatic, arm.reach / 20, 1.0)
-    anywhere = rng.uniform(-np.pi, np.pi, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
-    postures = np.concatenate([arm.home[None], near_home, anywhere])
+    random_postures = rng.uniform(-np.pi, np.pi, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 10, 1.0)
+    postures = np.concatenate([arm.home[None], near_home, random_postures])
     goal = targets_of(task, fk(arm, postures), postures)
     if geometry.rows is not None:
         branches = geometry.rows(goal)
@@ -139,10 +139,10 @@ def _sample_postures(arm: Arm, task: Task, geometry: Geometry) -> tuple[Array, A
     candidates = geometry.pairs(entries, prefer)
     values = np.broadcast_arrays(*cast("list[Array]", candidates.values()))
     q = np.stack([v.reshape(-1, len(postures)).T for v in values], axis=2)
-    # branch by branch, by the formulas of a small batch: those of a large one would be recorded for this alone
-    missing = np.stack([newton.misses(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
+    # branch by branch, since formulas for a large batch would have to be recorded first
+    misses = np.stack([newton.misses(arm, task, branch, goal) for branch in q.swapaxes(0, 1)], axis=1)
     edge = np.broadcast_to(candidates.doubt.edge, values[0].shape).reshape(q.shape[1], -1).T
-    return postures, q, (missing < tol.SOLUTION) & ~edge
+    return postures, q, (misses < tol.SOLUTION) & ~edge
 
 
 def _bent_wrist(arm: Arm, postures: Array) -> Array:
@@ -161,21 +161,21 @@ def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     points = _joint_origins(arm, flat)
     _, directions = joint_axes(Chain(arm.link, arm.prismatic))
     if abs(directions[min(arm.n, 3) - 1, 2]) >= 0.9:  # the elbow's axis is along the base's z
-        # in the base's plane: to the left of the way from the first joint to the tool
-        way = points[:, -1] - points[:, 0]
+        # in the base's plane: to the left of the line from the first joint to the tool
+        reach_vector = points[:, -1] - points[:, 0]
         elbow = points[:, 1] - points[:, 0]
-        left = way[:, 0] * elbow[:, 1] - way[:, 1] * elbow[:, 0]
-        return left.reshape(shape), np.zeros(shape)
+        lateral = reach_vector[:, 0] * elbow[:, 1] - reach_vector[:, 1] * elbow[:, 0]
+        return lateral.reshape(shape), np.zeros(shape)
     shoulder, elbow, wrist = points[:, 1], points[:, 2], points[:, 3]
-    way = wrist - shoulder
-    length = np.linalg.norm(way, axis=1)
-    tilt = np.abs(way[:, 2]) / np.maximum(length, tol.NO_LENGTH)
-    # far from the axis no offset of the shoulder changes the direction of the way
+    reach_vector = wrist - shoulder
+    length = np.linalg.norm(reach_vector, axis=1)
+    tilt = np.abs(reach_vector[:, 2]) / np.maximum(length, tol.NO_LENGTH)
+    # far from the axis an offset of the shoulder hardly changes the direction
     return elbow[:, 2].reshape(shape), (tilt - length / max(float(length.max()), tol.NO_LENGTH)).reshape(shape)
 
 
 def _joint_origins(arm: Arm, q: Array) -> Array:
-    """Origins of joints 1, 2, ... and of what follows joint 3: (M, up to 4, 3)."""
+    """Origins of joints 1 to 3 and of the frame behind joint 3: (M, up to 4, 3)."""
     P = np.broadcast_to(arm.link[0], (len(q), 4, 4))
     points = [P[:, :3, 3]]
     for i in range(min(arm.n, 3)):

@@ -1,8 +1,8 @@
-"""Branch numbers that follow a path: the answers of neighbouring targets put into the same order.
+"""Branch numbers along a path: puts the answers of neighbouring targets into the same order.
 
-A closed form numbers its branches by choices of sign, which a path keeps. An elimination returns
-them in the order of its eigenvalues, which means nothing. Along a path the same branch is the one
-that has moved least, as long as the targets are so close that this is beyond doubt.
+A closed form numbers its branches by signs, which do not change along a path. An elimination
+returns branches in the arbitrary order of its eigenvalues. Between neighbouring targets the same
+branch is the one that moves least, provided that the targets are close enough to be certain.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from armkin.model.arm import Arm
 
 CHUNK = 2048  # targets linked at once
 
-STEP_DISTANCE = 0.2  # distance [rad or reaches] that a branch may move from one target to the next
-CLEAR_RATIO = 1.5  # ratio, at least, of the distances to the second best partner and to the best one
+STEP_DISTANCE = 0.2  # largest motion [rad or reaches] of a branch between two targets
+CLEAR_RATIO = 1.5  # least ratio of the distances to the second best and to the best partner
 
 
 def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
@@ -36,36 +36,36 @@ def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     rows = 1 + np.flatnonzero(_is_path(arm, task, target)) if N > 1 and B > 1 else np.zeros(0, np.intp)
     for start in range(0, len(rows), CHUNK):
         part = rows[start : start + CHUNK]
-        for k, before in zip(part.tolist(), _linked_branches(arm, q[part], q[part - 1]), strict=True):
-            linked = before >= 0
-            numbers[k] = np.where(linked, numbers[k - 1][before], -1)
+        for row, partners in zip(part.tolist(), _linked_branches(arm, q[part], q[part - 1]), strict=True):
+            linked = partners >= 0
+            numbers[row] = np.where(linked, numbers[row - 1][partners], -1)
             if not linked.all():
-                taken = np.zeros(B, bool)
-                taken[numbers[k][linked]] = True
+                used = np.zeros(B, bool)
+                used[numbers[row][linked]] = True
                 unlinked = np.flatnonzero(~linked)
-                # real branches first, then the empty places
-                numbers[k][unlinked[np.argsort(~valid[k, unlinked], kind="stable")]] = np.flatnonzero(~taken)
+                # branches get numbers before empty places
+                numbers[row][unlinked[np.argsort(~valid[row, unlinked], kind="stable")]] = np.flatnonzero(~used)
     return np.where(valid, numbers, -1)
 
 
 def _is_path(arm: Arm, task: Task, target: Array) -> Bool:
-    """Which targets lie so close to the one before that branches may be followed: (N - 1,)."""
+    """Whether each target is close enough to its predecessor to follow branches: (N - 1,)."""
     full = task.orientation == "full"
-    moved = np.diff(target[:, :3].reshape(len(target), -1) if full else target, axis=0)
+    change = np.diff(target[:, :3].reshape(len(target), -1) if full else target, axis=0)
     p = [3, 7, 11] if full else list(range(task.position))
-    moved[:, p] /= arm.reach
+    change[:, p] /= arm.reach
     if len(task.sums):
-        turned = moved[:, task.position :]
-        turned[...] = wrap_angle(turned)
-    return np.asarray(np.abs(moved).max(axis=1) < STEP_DISTANCE)
+        angle_change = change[:, task.position :]
+        angle_change[...] = wrap_angle(angle_change)
+    return np.asarray(np.abs(change).max(axis=1) < STEP_DISTANCE)
 
 
-def _linked_branches(arm: Arm, after: Array, before: Array) -> Int:
-    """For every branch of targets (M, B, n) its partner at the target before, or -1: (M, B)."""
-    apart = newton.distances(arm, after, before)
-    apart[np.isnan(apart)] = np.inf
-    partner, back = apart.argmin(axis=2), apart.argmin(axis=1)
-    nearest, second = np.moveaxis(np.partition(apart, 1, axis=2)[:, :, :2], 2, 0)
+def _linked_branches(arm: Arm, current: Array, previous: Array) -> Int:
+    """The partner of every branch of targets (M, B, n) at the previous target, or -1: (M, B)."""
+    distances = newton.distances(arm, current, previous)
+    distances[np.isnan(distances)] = np.inf
+    partner, back_partner = distances.argmin(axis=2), distances.argmin(axis=1)
+    nearest, second = np.moveaxis(np.partition(distances, 1, axis=2)[:, :, :2], 2, 0)
     clear = (nearest < STEP_DISTANCE) & (second > CLEAR_RATIO * nearest)
-    mutual = np.take_along_axis(back, partner, axis=1) == np.arange(after.shape[1])
+    mutual = np.take_along_axis(back_partner, partner, axis=1) == np.arange(current.shape[1])
     return np.where(clear & mutual, partner, -1)

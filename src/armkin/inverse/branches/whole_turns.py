@@ -1,4 +1,4 @@
-"""Whole turns and limits: which copy of a joint value is legal and nearest."""
+"""Whole turns and limits: the copy of a joint value that is legal and nearest."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK
 from armkin.model.units import TURN
 
-HALF_TURN = np.pi + SLACK  # distance [rad] above `near`, at most, of a copy
-MAX_COPIES = 50_000  # copies of one branch that `turns` gives
+HALF_TURN = np.pi + SLACK  # largest distance [rad] of a copy above `near`
+MAX_COPIES = 50_000  # most copies of a branch from `turns`
 
 
 def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in the cache
     value: Array, near: Array | float, lower: float, upper: float, slides: bool = False
 ) -> tuple[Array, Truth]:
-    """The copy of a joint's values, modulo whole turns, that is legal and nearest; one that slides has no copies.
+    """The copy of a joint's values, modulo whole turns, that is legal and nearest; a prismatic joint has no copies.
 
     value: any shape, in [-pi, pi]; near: broadcastable [rad]. Returns the values and
-    whether they are within [lower, upper]; where no copy is, the principal value. Of two that are half a turn from
-    `near`, to within SLACK, the one above it: rounding must not decide.
+    whether they are within [lower, upper]; without a legal copy the principal value. Of two copies half a turn from
+    `near`, to within SLACK, it is the upper one, so that rounding does not decide.
     """
     if slides:
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     if lower >= -np.pi and upper <= np.pi:
-        # the principal value is the only one that can be legal, but for half a turn, which has two
+        # only the principal value can be legal, or one of the two for half a turn
         value, low, high = _principal_values(value), lower - SLACK, upper + SLACK
         if low <= -np.pi or high >= np.pi:
             value = _half_turned(value, near, low, high)
@@ -45,27 +45,27 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
     if at_zero:
         value = _principal_values(value)
     else:
-        turned = np.asarray((near + HALF_TURN) - value)  # one array for all steps: it stays in the cache
-        turned /= TURN
-        np.floor(turned, out=turned)
-        turned *= TURN
-        turned += value
-        value = turned
+        copy = np.asarray((near + HALF_TURN) - value)  # one array for all steps, which stays in the cache
+        copy /= TURN
+        np.floor(copy, out=copy)
+        copy *= TURN
+        copy += value
+        value = copy
     first, last = (-np.pi, -np.pi) if at_zero else (float(np.min(near)) - np.pi, float(np.max(near)) - np.pi)
     if lower <= first and upper >= last + TURN:
         return value, True
     below, above = value < lower - SLACK, value > upper + SLACK
-    # a value below the limits has its nearest legal copy just above their lower end, if any is legal; it
-    # lies in the turn after the one around `near`, so it can help no `near` if the limits end before the first of these
+    # The nearest legal copy of a value below the limits is just above the lower limit, one turn after that around
+    # `near`; there is none if the limits end before the first such turn.
     if upper > first + TURN - SLACK and below.any():
-        moved = value + TURN * np.ceil((lower - SLACK - value) / TURN)
-        fits = below & (moved <= upper + SLACK)
-        value, below = np.where(fits, moved, value), below & ~fits
+        shifted = value + TURN * np.ceil((lower - SLACK - value) / TURN)
+        fits = below & (shifted <= upper + SLACK)
+        value, below = np.where(fits, shifted, value), below & ~fits
     # a copy may lie SLACK above the half turn, and a legal one SLACK below the lower end
     if lower < last + 3 * SLACK and above.any():
-        moved = value - TURN * np.ceil((value - upper - SLACK) / TURN)
-        fits = above & (moved >= lower - SLACK)
-        value, above = np.where(fits, moved, value), above & ~fits
+        shifted = value - TURN * np.ceil((value - upper - SLACK) / TURN)
+        fits = above & (shifted >= lower - SLACK)
+        value, above = np.where(fits, shifted, value), above & ~fits
     outside = below | above
     if not at_zero and outside.any():
         value = np.where(outside, _principal_values(original), value)
@@ -73,31 +73,31 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
 
 
 def _principal_values(value: Array) -> Array:
-    """Values in [-pi, pi]; half a turn, which has two, as the positive one."""
+    """Values in [-pi, pi], with half a turn as +pi."""
     if value.min(initial=0.0) >= SLACK - np.pi:
         return value
     return np.where(value < SLACK - np.pi, value + TURN, value)
 
 
 def _half_turned(value: Array, near: Array | float, low: float, high: float) -> Array:
-    """Principal values; of half a turn the copy that is legal and nearer."""
+    """Principal values, with half a turn as the legal and nearer of its two copies."""
     if value.max(initial=0.0) <= np.pi - SLACK:
         return value
     indices = np.flatnonzero(value > np.pi - SLACK)
-    above, close = value.take(indices), np.broadcast_to(near, value.shape).flat[indices]
+    above, near_values = value.take(indices), np.broadcast_to(near, value.shape).flat[indices]
     below = above - TURN
     legal = (above >= low) & (above <= high)
-    better = (below >= low) & (below <= high)
-    better &= ~legal | (np.abs(below - close) < np.abs(above - close) - SLACK)
+    is_below = (below >= low) & (below <= high)
+    is_below &= ~legal | (np.abs(below - near_values) < np.abs(above - near_values) - SLACK)
     value = value.copy()
-    value.put(indices, np.where(better, below, above))
+    value.put(indices, np.where(is_below, below, above))
     return value
 
 
 def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a call more would be felt
     value: float, near: float, lower: float, upper: float, slides: bool
 ) -> tuple[float, bool]:
-    """`nearest_copy` of one number, operation by operation; a joint that slides has no copies.
+    """`nearest_copy` of one number, with the same operations; a prismatic joint has no copies.
 
     >>> nearest_number(3.0, -2.0, -4.0, 4.0, False) == (3.0 - TURN, True)
     True
@@ -120,22 +120,22 @@ def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a
     if (lower <= first and upper >= first + TURN) or low <= value <= high:
         return value, True
     if value < low and upper > first + TURN - SLACK:
-        moved = value + TURN * math.ceil((low - value) / TURN)
-        if moved <= high:
-            return moved, True
+        shifted = value + TURN * math.ceil((low - value) / TURN)
+        if shifted <= high:
+            return shifted, True
     if value > high and lower < first + 3 * SLACK:
-        moved = value - TURN * math.ceil((value - upper - SLACK) / TURN)
-        if moved >= low:
-            return moved, True
+        shifted = value - TURN * math.ceil((value - upper - SLACK) / TURN)
+        if shifted >= low:
+            return shifted, True
     return principal, False
 
 
 def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
     """Rows (..., n) with every joint at its nearest legal copy, and whether all are within limits: (...)."""
-    if (turned := actual_arm(arm)) is not arm:
-        rows, legal = nearest_row(turned, q * arm.ratio, near * arm.ratio)
+    if (actual := actual_arm(arm)) is not arm:
+        rows, legal = nearest_row(actual, q * arm.ratio, near * arm.ratio)
         return rows / arm.ratio, legal
-    copies = q.copy(order="K")  # joint after joint, where q is
+    copies = q.copy(order="K")  # in the memory order of q
     inside = np.ones_like(q[..., 0], bool)
     if not q.size:
         return copies, inside
@@ -148,7 +148,7 @@ def nearest_row(arm: Arm, q: Array, near: Array) -> tuple[Array, Bool]:
 
 
 def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array, Truth]:
-    """`nearest_copy` of values of joint i, of an arm that turns as it is told."""
+    """`nearest_copy` of values of joint i, of an arm without ratios."""
     slides, limits = bool(arm.prismatic[i]), (float(arm.lower[i]), float(arm.upper[i]))
     return nearest_copy(value if slides else wrap_angle(value), near, *limits, slides)
 
@@ -156,8 +156,8 @@ def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
-    An unlimited revolute joint has copies without end: it gives the one nearest to `near` alone. Of equal motions the
-    copy above `near` is first.
+    An unlimited revolute joint has infinitely many copies, of which only the nearest to `near` is given. Of equal
+    motions the copy above `near` is first.
 
     Args:
         arm: the arm, as `armkin.load` gives it.
@@ -176,14 +176,14 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     32
     """
     row = one_pose(arm, q, "q")
-    close = one_pose(arm, arm.home if near is None else near, "near")
-    if (turned := actual_arm(arm)) is not arm:
-        return turns(turned, row * arm.ratio, close * arm.ratio) / arm.ratio
+    reference = one_pose(arm, arm.home if near is None else near, "near")
+    if (actual := actual_arm(arm)) is not arm:
+        return turns(actual, row * arm.ratio, reference * arm.ratio) / arm.ratio
     choices = []
     for i in range(arm.n):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         if arm.prismatic[i] or not (np.isfinite(lower) and np.isfinite(upper)):
-            value, fits = nearest_of_joint(arm, i, row[i : i + 1], close[i])
+            value, fits = nearest_of_joint(arm, i, row[i : i + 1], reference[i])
             choices.append([float(value[0])] if np.all(fits) else [])
         else:
             first = int(np.ceil((lower - SLACK - row[i]) / TURN))
@@ -195,5 +195,5 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
         raise UsageError(message, copies=count, most=MAX_COPIES)
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
-    motion = (np.abs(rows - close) * unit).sum(axis=1)
+    motion = (np.abs(rows - reference) * unit).sum(axis=1)
     return rows[np.argsort(motion.round(tol.EQUAL), kind="stable")]

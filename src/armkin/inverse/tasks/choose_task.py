@@ -1,4 +1,4 @@
-"""Which task fits an arm: the one of the robot file, the one asked for, or the one that its structure suggests."""
+"""Chooses the task of an arm: the requested one, that of the robot file, or the one that its structure suggests."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from armkin.model.arm import Arm
 from armkin.model.joint_chain import Chain, joint_axes
 from armkin.model.units import radian_or_reach
 
-NEARLY_PARALLEL = 3e-3  # angle [rad] of axes that count as parallel for the choice of a task, not for its solution
-INDEPENDENT = 1e-4  # singular value from which on a task's rows are independent
+NEARLY_PARALLEL = 3e-3  # largest angle [rad] of axes that count as parallel for the choice of a task
+INDEPENDENT = 1e-4  # least singular value of independent rows of a task
 Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 
 
@@ -37,7 +37,7 @@ def task_for(arm: Arm, name: str | None = None) -> Task:
 
 
 def _taskless_error(arm: Arm) -> UsageError:
-    """What to say of an arm whose structure suggests no task."""
+    """The error of an arm whose structure suggests no task."""
     problem = f"{arm.name}: no task fits its {_joint_kinds(arm)} by itself"
     free = rank(arm, _free_task(arm, "pose"))
     if free < 2:
@@ -49,7 +49,7 @@ def _taskless_error(arm: Arm) -> UsageError:
 
 
 def redundant_error(arm: Arm, surplus: int, problem: str) -> RedundantArmError:
-    """The error of an arm so many of whose joints have to be held."""
+    """The error of an arm of which `surplus` joints have to be held."""
     names = list(arm.joint_names)
     advice = f"hold {surplus} of {', '.join(names)} with armkin.lock(arm, {{joint: value}})"
     return RedundantArmError(problem, advice=advice, robot=arm.name, joints=names, surplus=surplus)
@@ -102,8 +102,8 @@ def _axis_directions(arm: Arm) -> Array:
 def _parallel_signs(directions: Array, reference: Array) -> NDArray[np.float64]:
     """+1 or -1 where a direction is parallel or antiparallel to the reference, else 0."""
     cosine = directions @ reference
-    across = np.linalg.norm(np.cross(directions, reference), axis=1)
-    return np.where(across < NEARLY_PARALLEL, np.sign(cosine), 0.0)
+    sine = np.linalg.norm(np.cross(directions, reference), axis=1)
+    return np.where(sine < NEARLY_PARALLEL, np.sign(cosine), 0.0)
 
 
 def _planar_task(arm: Arm, name: str) -> Task | str:

@@ -1,4 +1,4 @@
-"""What joint values miss of their targets, and how it changes with them: the rows of every Newton step."""
+"""Residuals of targets and their Jacobians: the equations of every Newton step."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ import numpy as np
 from armkin.formula.arrays import Array, wrap_angle
 from armkin.inverse.tasks.task import NO_DIRECTION, Task
 
-SMALL_TURN = 1e-8  # difference of a small rotation's trace from 3
-HALF_TURN = 1e-6  # sine of the angle of a rotation that is about half a turn
-TINY = 1e-300  # floor of a divisor: it keeps a quotient finite where the divisor is zero
+SMALL_TURN = 1e-8  # largest difference of a small rotation's trace from 3
+HALF_TURN = 1e-6  # a rotation by nearly half a turn has a smaller sine
+TINY = 1e-300  # floor of divisors, which keeps quotients finite
 
 
 def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -> Array:
-    """What is missing to the targets: (M, position + sums + orientation), lengths in units [mm] first, then rad.
+    """The differences to the targets: (M, position + sums + orientation), lengths in units [mm] first, then rad.
 
     T: (M, 4, 4) the tool's poses; q: (M, n); target: (M, m) or (M, 4, 4).
     """
     if task.orientation == "full":
-        missing = np.empty((len(T), 6))
-        missing[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
+        difference = np.empty((len(T), 6))
+        difference[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
         # half the sum of the columns' vector products is the rotation vector to third order
         R, back = T[:, :3, :3], np.swapaxes(target[:, :3, :3], 1, 2)
         C = np.ascontiguousarray(R) @ np.ascontiguousarray(back)  # views take three times as long
         for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-            missing[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
-        far = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
-        if far.any():
-            missing[far, 3:] = _rotation_vector(np.swapaxes(C[far], 1, 2))
-        return missing
+            difference[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
+        is_large = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
+        if is_large.any():
+            difference[is_large, 3:] = _rotation_vector(np.swapaxes(C[is_large], 1, 2))
+        return difference
     parts = [(target[:, : task.position] - T[:, : task.position, 3]) / unit]
     if len(task.sums):
         sums = target[:, task.position : task.position + len(task.sums)]
@@ -41,16 +41,16 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
         cosine = np.einsum("mi,mi->m", z, target[:, 3:])
         angle = np.arctan2(sine, cosine)
         w = np.where(sine[:, None] > NO_DIRECTION, w * (angle / np.maximum(sine, TINY))[:, None], w)
-        half = (sine <= NO_DIRECTION) & (cosine < 0)  # opposed: any axis across will do
-        w[half] = np.pi * T[half][:, :3, 0]
+        is_opposed = (sine <= NO_DIRECTION) & (cosine < 0)  # opposed: any perpendicular axis
+        w[is_opposed] = np.pi * T[is_opposed][:, :3, 0]
         parts.append(w)
     return np.concatenate(parts, axis=1)
 
 
 def task_jacobian(task: Task, J: Array, T: Array) -> Array:
-    """Rows of the task: (M, 6, n) geometric Jacobians at poses T (M, 4, 4) -> (M, rows, n), in the order of `residual`.
+    """The task's rows (M, rows, n) of geometric Jacobians (M, 6, n) at poses T (M, 4, 4), in the order of `residual`.
 
-    Of a task that prescribes an axis without the turn about the tool's z axis.
+    For a task that prescribes an axis, the rotation about the tool's z axis is left out.
     """
     if task.orientation == "full":
         return J
@@ -64,7 +64,7 @@ def task_jacobian(task: Task, J: Array, T: Array) -> Array:
 
 
 def _rotation_vector(R: Array) -> Array:
-    """Rotation vectors of rotation matrices (M, 3, 3), also near half a turn."""
+    """Rotation vectors of rotation matrices (M, 3, 3), accurate also near half a turn."""
     w = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
     s = np.linalg.norm(w, axis=1)
     c = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)

@@ -1,4 +1,4 @@
-"""Targets: which numbers a task prescribes, and how they are read.
+"""Tasks and their targets: the numbers that a task prescribes, and how they are read.
 
 Every task is a choice of three kinds of constraints:
 
@@ -6,7 +6,7 @@ Every task is a choice of three kinds of constraints:
 - sums of joint values modulo a turn (`sums`: theta, phi, yaw, roll),
 - the direction of the tool's z axis or its whole orientation (`orientation`).
 
-What is missing to a target stands in `residuals`, which task fits an arm in `choose_task`.
+`residuals` computes the error of a pose from its target, `choose_task` the task of an arm.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ LABELS = {
     "xyz_axis": ("x", "y", "z", "ax", "ay", "az"),
     "pose": ("x", "y", "z", "roll", "pitch", "yaw"),
 }
-ROTATION = 5e-6  # largest distance from orthonormal columns that is taken for rounding: six printed digits
+ROTATION = 5e-6  # largest distance from orthonormal columns that counts as rounding, six printed digits
 ROUNDED = 1e-14  # distance from orthonormal columns that needs no correction
-NO_DIRECTION = 1e-12  # length of a vector that has no direction
-AROUND_DISTANCE = 1e-4  # distance [reaches, rad] of the targets around one from it
-MAX_TARGET = 1e15  # size [mm, rad] of a target, at most: its powers in the polynomials stay finite
+NO_DIRECTION = 1e-12  # a shorter vector has no direction
+AROUND_DISTANCE = 1e-4  # distance [reaches, rad] of `targets_around` from their target
+MAX_TARGET = 1e15  # largest size [mm, rad] of a target, so that its powers stay finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ class Task:
 
     @cached_property
     def constraints(self) -> int:
-        """How many degrees of freedom the target takes."""
+        """The number of degrees of freedom that a target fixes."""
         return self.position + len(self.sums) + {"none": 0, "axis": 2, "full": 3}[self.orientation]
 
 
@@ -74,10 +74,10 @@ def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
 
 
 def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...], Array]:
-    """Targets (..., m), or (..., 4, 4) for poses, as a flat batch (N, ...); its shape; how far rotations were off (N,).
+    """Targets (..., m), or (..., 4, 4) for poses, as a flat batch (N, ...); its shape; defects of rotations (N,).
 
-    A pose whose rotation was rounded, to six decimals or to float32, is answered as the rotation next to
-    it. Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
+    A rotation that was rounded, to six decimals or to float32, is replaced by the nearest rotation.
+    Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
     length or a matrix that is no rotation to 5e-6.
     """
     flat, lead = flat_targets(task, targets)
@@ -94,7 +94,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
 
 
 def flat_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]]:
-    """Targets as a flat batch (N, m), or (N, 4, 4) for poses, which are not read yet; and the batch's shape."""
+    """Targets as a flat batch (N, m), or (N, 4, 4) for poses with unchecked rotations, and the batch's shape."""
     values = arrays.real_array(targets, "targets")
     shape = (4, 4) if task.orientation == "full" else (len(task.labels),)
     if values.shape[-len(shape) :] != shape or values.ndim < len(shape):
@@ -120,7 +120,7 @@ def _refuse_wild(values: Array) -> None:
 
 
 def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
-    """Poses (N, 4, 4) with the rotations next to those given, how far these were off (N,), and the entries."""
+    """Poses (N, 4, 4) with the nearest rotations, the defects of the given ones (N,), and the entries."""
     _refuse_wild(T)
     entries = pose.read_pose(T)
     check = rotation_check()
@@ -140,7 +140,7 @@ def read_poses(T: Array) -> tuple[Array, Array, pose.Pose]:
 
 @cache
 def rotation_check() -> StraightLineCode:
-    """How far the columns x and z are from unit vectors at right angles, and y from z x x."""
+    """The formula of a rotation's defect: the distance of x and z from orthonormal vectors, and of y from z x x."""
 
     def formula(P: pose.Pose) -> list[Entry]:
         x, y, z = P[0:3], P[3:6], P[6:9]
@@ -155,7 +155,7 @@ def rotation_check() -> StraightLineCode:
 
 
 def nearest_rotation(R: Array) -> Array:
-    """The rotations next to matrices (N, 3, 3) that are rotations to 5e-6: their orthogonal polar factors.
+    """The nearest rotations to matrices (N, 3, 3) that are rotations to 5e-6: their orthogonal polar factors.
 
     Two steps of Newton and Schulz, R (3 - R^T R) / 2, each of which squares the distance
     (Higham, Functions of Matrices, 2008, eq. 8.20).
@@ -173,7 +173,7 @@ def nearest_rotation(R: Array) -> Array:
 
 
 def targets_of(task: Task, T: Array, q: Array) -> Array:
-    """The targets that poses T (M, 4, 4) of joint values q (M, n) answer: (M, m) or (M, 4, 4)."""
+    """The targets that poses T (M, 4, 4) at joint values q (M, n) reach: (M, m) or (M, 4, 4)."""
     if task.orientation == "full":
         return T
     parts = [T[:, : task.position, 3], q @ task.sums.T + task.offsets]
@@ -182,30 +182,30 @@ def targets_of(task: Task, T: Array, q: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def shifted_targets(arm: Arm, task: Task, target: Array, way: Array) -> Array:
-    """Targets (M, m) or (M, 4, 4) moved a little; way: (6,) three [reaches], three [rad]."""
+def shifted_targets(arm: Arm, task: Task, target: Array, shift: Array) -> Array:
+    """Targets (M, m) or (M, 4, 4) moved a little; shift: (6,) three [reaches], three [rad]."""
     targets = target.copy()
     if task.orientation == "full":
-        targets[:, :3, 3] += way[:3] * arm.reach
-        x, y, z = way[3:]
+        targets[:, :3, 3] += shift[:3] * arm.reach
+        x, y, z = shift[3:]
         spin = np.array([[1, -z, y], [z, 1, -x], [-y, x, 1]])
         targets[:, :3, :3] = np.linalg.qr(spin)[0] * np.sign(np.diag(np.linalg.qr(spin)[1])) @ target[:, :3, :3]
         return targets
-    targets[:, : task.position] += way[: task.position] * arm.reach
+    targets[:, : task.position] += shift[: task.position] * arm.reach
     angles = targets.shape[1] - task.position
-    targets[:, task.position :] += way[3 : 3 + angles]
+    targets[:, task.position :] += shift[3 : 3 + angles]
     if task.orientation == "axis":
         targets[:, 3:] /= np.linalg.norm(targets[:, 3:], axis=1, keepdims=True)
     return targets
 
 
 def targets_around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: float = AROUND_DISTANCE) -> Array:
-    """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], each way also backwards: (M, 2 pairs, ...)."""
-    ways = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
-    return np.stack([shifted_targets(arm, task, target, sign * way) for way in ways for sign in (1.0, -1.0)], axis=1)
+    """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], in opposite pairs: (M, 2 pairs, ...)."""
+    moves = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
+    return np.stack([shifted_targets(arm, task, target, sign * d) for d in moves for sign in (1.0, -1.0)], axis=1)
 
 
 def distance(arm: Arm, task: Task, target: Array) -> Array:
-    """How far targets (M, m) or (M, 4, 4) are from the arm's first joint, in reaches: (M,)."""
+    """Distances of targets (M, m) or (M, 4, 4) from the arm's first joint [reaches]: (M,)."""
     p = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
     return np.asarray(np.linalg.norm(p - arm.link[0][: p.shape[1], 3], axis=1) / arm.reach)
