@@ -113,9 +113,7 @@ class _EndJoints:
         second, _ = sub.rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
         free = (across < tol.LOOSE) | (doubt.edge & (across < tol.LOOSE_DOUBLE))
-        if prefer[1] is not None and np.any(free):
-            second = Pair(arrays.where(free, prefer[1].c, second.c), arrays.where(free, prefer[1].s, second.s))
-        return [first, second, last], doubt | Doubt(free, free)
+        return [first, sub.with_preferred(second, free, prefer[1]), last], doubt | Doubt(free, free)
 
     def _quartic(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
         f = [_combination(row, sides) for row in np.linalg.inv(self.A)]
@@ -173,9 +171,9 @@ class _Loop:
         goal = [*goal[:9], *(arrays.mul(self.unit, v) for v in goal[9:])]
         back = pose.inverse(pose.compose(pose.compose(self.from_base, goal), self.from_tool))
         before, between = (self.before, back) if self.first == 1 else (back, self.between)
-        height: Entry
+        after = pose.constant(self.out)
+        height: Entry = 0.0
         three_angles: Sequence[Entry | None]
-        after, height = pose.constant(self.out), 0.0
         if self.points is None:
             assert self.three_link is not None
             sense = self.three_link.sense4

@@ -195,7 +195,6 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
             return Candidates(pairs, doubt, miss)
 
         return Geometry("elbow", why, True, xyz, labels=labels)
-
     if task.name == "xyz_roll":
         return Geometry("elbow with roll", f"{why}, joint 4 is the roll", True, _roll(arm, task, elbow), labels=labels)
     return Geometry("elbow with pitch", why, True, _pitch(arm, task, elbow), labels=labels)
@@ -219,8 +218,7 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
             P = pose.compose(pose.rotate(past, *fifth), pose.constant(link[5]))
         else:
             fifth, P = None, past
-        x, y, z = pose.turn_direction(turned, P[9:12])
-        offset = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
+        offset = spin(c, s, pose.turn_direction(turned, P[9:12]))
         pairs, doubt = elbow.solve(goal[:3], offset, prefer)
         # joint 4 takes what is left of the sum
         c4, s4 = c, s

@@ -70,6 +70,7 @@ class Pair(NamedTuple):
 
 # What to give a joint that a target leaves free, or None.
 Prefer = Sequence[Pair | None]
+Conic = tuple[Entry, ...]  # a, b, u, v, w of the matrix [[a, b, u], [b, -a, v], [u, v, w]]; diag(1, 1, -1): circle
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +171,7 @@ def linear(
     """
     sign = signs(axis)
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
-    if disc is None:
-        disc = h2 - c * c
+    disc = h2 - c * c if disc is None else disc
     thresholds = precision()
     edge = arrays.absolute(disc) < (thresholds.tangent if tangent is None else tangent) * h2
     root = arrays.sqrt(arrays.maximum(disc, 0.0)) * sign
@@ -186,15 +186,14 @@ def linear(
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
     nearly = h2 < thresholds.nearly_free * scale * scale
-    return _with_preferred(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
+    return with_preferred(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
 
 
 def one_root(a: Entry, b: Entry, c: Entry) -> Entry:
     """``a^2 + b^2 - c^2`` for `linear`, zero where rounding alone parts the two roots."""
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
     disc = h2 - c * c
-    discriminant: Entry = arrays.where(arrays.absolute(disc) < precision().one_root * h2, 0.0, disc)
-    return discriminant
+    return arrays.where(arrays.absolute(disc) < precision().one_root * h2, 0.0, disc)
 
 
 def on_unit_circle(pair: Pair) -> Pair:
@@ -225,10 +224,10 @@ def rotation_between(
         free, nearly = h2 < least * least, h2 < (thresholds.nearly_free * scale * scale) ** 2
         inverse = 1.0 / arrays.sqrt(arrays.maximum(h2, least * least))
         c, s = c * inverse, s * inverse
-    return _with_preferred(Pair(c, s), free, prefer), Doubt(nearly, free)
+    return with_preferred(Pair(c, s), free, prefer), Doubt(nearly, free)
 
 
-def _with_preferred(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
+def with_preferred(pair: Pair, free: Bool, prefer: Pair | None) -> Pair:
     """The pair, with the preferred angle where it is free."""
     if prefer is None or not np.any(free):
         return pair
@@ -245,7 +244,7 @@ def quadratic(
     vanishing a is no special case: its root goes to infinity.
     """
     a, b = arrays.mul(a, scale * scale), arrays.mul(b, scale)
-    size = arrays.add(arrays.add(abs(a), abs(b)), abs(c))
+    size = _absolute_sum((a, b, c))
     free = size < least
     inverse = 1.0 / arrays.maximum(size, least)
     a, b, c = a * inverse, b * inverse, c * inverse
@@ -280,18 +279,36 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     always has a root between -sqrt(h) and sqrt(h), whose lines are real.
     """
     e0, ec, es, ecc, ecs, ess = e
-    size = arrays.add(abs(ecc), abs(ess))
-    for v in (e0, ec, es, ecs):
-        size = arrays.add(size, abs(v))
+    size = _absolute_sum((ecc, ess, e0, ec, es, ecs))
     inverse = 1.0 / arrays.maximum(size, tol.NO_SIZE * scale)
-    # the conic's symmetric matrix [[a, b, u], [b, -a, v], [u, v, w]], less a multiple of the circle's diag(1, 1, -1)
     a, b = 0.5 * (ecc - ess) * inverse, 0.5 * ecs * inverse
     u, v = 0.5 * ec * inverse, 0.5 * es * inverse
-    w = (e0 + 0.5 * (ecc + ess)) * inverse
-    conic_size = abs(a)
-    for value in (b, u, v, w):
-        conic_size = arrays.add(conic_size, abs(value))
-    x, triple = _line_pair(a, b, u, v, w)
+    conic = a, b, u, v, (e0 + 0.5 * (ecc + ess)) * inverse
+    conic_size = _absolute_sum(conic)
+    x, triple = _line_pair(conic)
+    lines = _lines_of_conic(conic, x)
+    lx, ly, lz = (arrays.where(signs(0) > 0.0, *entries) for entries in zip(*lines, strict=True))
+    lx = lx + tol.UNDERFLOW  # a line at infinity has no direction
+    h2 = lx * lx + ly * ly
+    disc = h2 - lz * lz
+    pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
+    real = disc > -(tol.TOUCHING**2) * h2
+    root, slope = _on_conic(pair, real, conic)
+    merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
+    free = conic_size * size < tol.NO_SIZE * scale
+    return with_preferred(root, free, prefer), Doubt(merging | triple | free, free)
+
+
+def _absolute_sum(values: Sequence[Entry]) -> Entry:
+    total = abs(values[0])
+    for value in values[1:]:
+        total = arrays.add(total, abs(value))
+    return total
+
+
+def _lines_of_conic(conic: Conic, x: Entry) -> tuple[list[Entry], ...]:
+    """The two lines (lx, ly, lz), lx cos q + ly sin q + lz = 0, of a conic that degenerates with x times the circle."""
+    a, b, u, v, w = conic
     M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
     # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)
     columns = [
@@ -306,23 +323,12 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     px, py, pz = (down * value for value in column)
     rows = [[M[0][0], b - pz, u + py], [b + pz, M[1][1], v - px], [u - py, v + px, M[2][2]]]
     flipped = [list(row) for row in zip(*rows, strict=True)]
-    lines = [_longest_vector([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped)]
-    lx, ly, lz = (arrays.where(signs(0) > 0.0, *entries) for entries in zip(*lines, strict=True))
-    # a line at infinity has no direction
-    lx = lx + tol.UNDERFLOW
-    h2 = lx * lx + ly * ly
-    disc = h2 - lz * lz
-    pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
-    real = disc > -(tol.TOUCHING**2) * h2
-    root, slope = _on_conic(pair, real, a, b, u, v, w)
-    merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
-    free = conic_size * size < tol.NO_SIZE * scale
-    return _with_preferred(root, free, prefer), Doubt(merging | triple | free, free)
+    return tuple(_longest_vector([arrays.dot(v, v) for v in vectors], vectors) for vectors in (rows, flipped))
 
 
-def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Pair, Entry]:
+def _on_conic(pair: Pair, real: Truth, conic: Conic) -> tuple[Pair, Entry]:
     """Real roots after two Newton steps along the circle, and the slope there; see `trig_quadratic`."""
-    c, s = pair
+    (c, s), (a, b, u, v, w) = pair, conic
     for _ in range(2):
         value = w + 2.0 * (u * c + v * s) + a * (c * c - s * s) + 2.0 * b * c * s
         slope = 2.0 * (v * c - u * s) + 2.0 * b * (c * c - s * s) - 4.0 * a * c * s
@@ -334,7 +340,7 @@ def _on_conic(pair: Pair, real: Truth, a: Entry, b: Entry, u: Entry, v: Entry, w
     return Pair(c, s), slope
 
 
-def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry, Bool]:
+def _line_pair(conic: Conic) -> tuple[Entry, Bool]:
     """The x in [-sqrt(h), sqrt(h)] farthest from being double for which the conic plus x times the circle degenerates.
 
     And whether it is about to be triple: the circle and the conic touch in three or four points at once.
@@ -342,6 +348,7 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     ``x^3 - w x^2 + (r - h) x + rest = 0`` with h = a^2 + b^2 and r = u^2 + v^2 is not positive at
     -sqrt(h) and not negative at sqrt(h).
     """
+    a, b, u, v, w = conic
     h, r = a * a + b * b, u * u + v * v
     rest = w * h + a * (v * v - u * u) - 2.0 * b * u * v
     linear_ = r - h
@@ -350,14 +357,7 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
     q = 0.5 * (rest + third * linear_ - 2.0 * third * third * third)
     p3 = p / 3.0
     disc = q * q + p3 * p3 * p3
-    # one real root (Cardano) or three (Viete): the largest and the smallest of them
-    root = arrays.sqrt(arrays.absolute(disc))
-    A = arrays.cbrt(arrays.absolute(q) + root + tol.TINY)
-    alone = arrays.copysign(A - p3 / A, -q)
-    size = 2.0 * arrays.sqrt(arrays.maximum(-p3, 0.0))
-    c, s = arrays.cos_sin(arrays.arctan2(root, -q) / 3.0)
-    most = size * c
-    least = -0.5 * size * (c + np.sqrt(3.0) * s)
+    alone, most, least = _cubic_roots(p3, q, disc)
     # at an end, where two roots are double, rounding must not choose the double one
     span = arrays.sqrt(h) + tol.NO_SIZE
     above = arrays.maximum(most + third - span, 0.0)
@@ -370,6 +370,16 @@ def _line_pair(a: Entry, b: Entry, u: Entry, v: Entry, w: Entry) -> tuple[Entry,
         slope = (3.0 * x - 2.0 * w) * x + linear_
         x = x - value * slope / (slope * slope + tol.NO_CUBIC_SLOPE)
     return x, arrays.absolute(slope) < tol.LEVEL_ROOT
+
+
+def _cubic_roots(p: Entry, q: Entry, disc: Entry) -> tuple[Entry, Entry, Entry]:
+    """Roots of x^3 + 3 p x + 2 q, disc = p^3 + q^2: the only one (Cardano), largest and smallest of three (Viete)."""
+    root = arrays.sqrt(arrays.absolute(disc))
+    A = arrays.cbrt(arrays.absolute(q) + root + tol.TINY)
+    alone = arrays.copysign(A - p / A, -q)
+    size = 2.0 * arrays.sqrt(arrays.maximum(-p, 0.0))
+    c, s = arrays.cos_sin(arrays.arctan2(root, -q) / 3.0)
+    return alone, size * c, -0.5 * size * (c + np.sqrt(3.0) * s)
 
 
 def _longest_vector(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:

@@ -15,6 +15,7 @@ Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 
 from __future__ import annotations
 
+from itertools import accumulate, product
 from typing import cast
 
 import numpy as np
@@ -150,25 +151,13 @@ class Position:
             k: list[Entry] = [*across[:2], across[3] + across[2], across[4], across[5]]  # coefficients of d^0 ... d^4
             for six in g:
                 quad = [six[0], six[1], six[3]]
-                for i in range(3):
-                    for j in range(3):
-                        k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
+                for i, j in product(range(3), repeat=2):
+                    k[i + j] = arrays.add(k[i + j], arrays.mul(quad[i], quad[j]))
             if self.prismatic[0]:  # nothing beyond d^2
                 d, doubt = sub.quadratic(k[2], k[1], k[0], 0, size, tol.NO_SIZE * size * size, prefer[2])
-                third = Pair(d, None)
             else:
-                power: Entry = 1.0
-                for i in range(1, 5):
-                    power = arrays.mul(power, size)
-                    k[i] = arrays.mul(k[i], power)
-                k0, k1, k2, k3, k4 = k
-                ecc = 0.25 * (k4 + k0 - k2)
-                form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
-                turn, doubt = sub.trig_quadratic(form, size * size)
-                d = size * sub.half_tangent(turn)
-                if prefer[2] is not None and np.any(doubt.free):
-                    d = arrays.where(doubt.free, prefer[2].c, d)
-                third = Pair(d, None)
+                d, doubt = _quartic_roots(k, size, prefer[2])
+            third = Pair(d, None)
         gx, gy = (_at_joint(six, third) for six in g)
         y = self._tip(third)
         second, doubt2 = sub.rotation_between(y[0], y[1], gx, gy, size, prefer[1])
@@ -245,6 +234,19 @@ class Position:
             return Pair(arrays.mul(-1.0 / slope, constant), None), Doubt(np.zeros(1, bool))
         third, doubt = sub.linear(slope, sine, arrays.mul(-1.0, constant), 0, size, prefer[2])
         return sub.on_unit_circle(third), doubt
+
+
+def _quartic_roots(k: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Entry, Doubt]:
+    """The roots d = size tan(q/2) of a quartic with coefficients k of d^0 ... d^4: those of a quadratic in cos, sin."""
+    powers = accumulate([size] * 4, arrays.mul, initial=cast("Entry", 1.0))
+    k0, k1, k2, k3, k4 = (arrays.mul(value, power) for value, power in zip(k, powers, strict=True))
+    ecc = 0.25 * (k4 + k0 - k2)
+    form = [0.5 * k2 + ecc, 0.5 * (k0 - k4), 0.25 * (k1 + k3), ecc, 0.25 * (k1 - k3), 0.0]
+    turn, doubt = sub.trig_quadratic(form, size * size)
+    d = size * sub.half_tangent(turn)
+    if prefer is not None and np.any(doubt.free):
+        d = arrays.where(doubt.free, prefer.c, d)
+    return d, doubt
 
 
 def _at_joint(terms: list[Entry], joint: Pair) -> Entry:

@@ -16,17 +16,10 @@ import numpy as np
 from armkin.formula import arrays, pose
 from armkin.formula.arrays import Array, Entry
 from armkin.formula.pose import Pose
+from armkin.inverse.closed import subproblems as sub
 from armkin.inverse.closed.elbow import ThreeLink
 from armkin.inverse.closed.geometry import Geometry
-from armkin.inverse.closed.subproblems import (
-    Candidates,
-    Prefer,
-    distance2,
-    linear,
-    precision,
-    rotation_between,
-    walked_back,
-)
+from armkin.inverse.closed.subproblems import Candidates, Doubt, Pair, Prefer
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
@@ -46,7 +39,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     chain = reverse_chain(chain)
     if not has_three_parallel(chain, tolerance, arm.reach):
         return None
-    solve = walked_back(ThreeParallel(chain).solve)
+    solve = sub.walked_back(ThreeParallel(chain).solve)
     return Geometry("three parallel axes", "axes 3, 4 and 5 are parallel, axes 1 and 2 meet", True, solve)
 
 
@@ -99,44 +92,45 @@ class ThreeParallel:
     def solve(self, goal: Pose, prefer: Prefer) -> Candidates:
         """All joints for a pose, on branch axes (shoulder, elbow, wrist, N)."""
         D = pose.compose(pose.compose(self.from_base, goal), self.from_tool)  # joint 6's frame seen from joint 1
-        n, o = self.shoulder[6:9], self.shoulder[9:12]
-        g = arrays.combine(1.0, D[9:12], self.height6, D[6:9])
-        a = arrays.add(arrays.mul(n[0], g[0]), arrays.mul(n[1], g[1]))
-        b = arrays.sub(arrays.mul(n[0], g[1]), arrays.mul(n[1], g[0]))
-        right = arrays.sub(self.along + arrays.dot(n, o), arrays.mul(n[2], g[2]))
-        first, doubt1 = linear(a, b, right, 0, self.scale, prefer[0])
+        first, doubt1 = self._shoulder_joint(D, prefer[0])
         c1, s1 = first
-        # n seen from joint 6
-        nx = arrays.sub(arrays.mul(c1, n[0]), arrays.mul(s1, n[1]))
-        ny = arrays.add(arrays.mul(s1, n[0]), arrays.mul(c1, n[1]))
-        w = pose.turn_back(D, [nx, ny, n[2]])
-        disc = w[0] * w[0] + w[1] * w[1] if self.orthogonal else None
-        thresholds = precision()
-        # an oblique wrist's two roots merge whole
-        tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
-        fifth, doubt5 = linear(self.cos5, self.sin5, w[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
-        c5, s5 = fifth
-        m = self.m
-        mx = arrays.add(arrays.mul(c5, m[0]), arrays.mul(s5, m[1]))
-        my = arrays.sub(arrays.mul(c5, m[1]), arrays.mul(s5, m[0]))
-        v = pose.turn_back(self.B, [mx, my, m[2]])
-        # Rz(-q6) v = w
-        sixth, doubt6 = rotation_between(w[0], w[1], v[0], v[1], 1.0, prefer[5], disc)
+        n_tool = pose.turn_back(D, sub.spin(c1, s1, self.shoulder[6:9]))
+        (fifth, doubt5), (sixth, doubt6) = self._wrist_joints(n_tool, prefer)
         # joint 4's frame seen from joint 2
         X = pose.compose(pose.rotate(D, sixth.c, -sixth.s), self.back5)
-        X = pose.compose(pose.rotate(X, c5, -s5), self.back4)
+        X = pose.compose(pose.rotate(X, fifth.c, -fifth.s), self.back4)
         p = pose.apply(self.to_joint2, _turned_back(c1, s1, X[9:12]))
         x = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[0:3]))
-        pairs, angles, doubt23 = self.three_link.solve(p, x, prefer[1:4])
-        doubt = doubt1 | doubt5 | doubt6 | doubt23
+        pairs, angles, doubt234 = self.three_link.solve(p, x, prefer[1:4])
+        doubt = doubt1 | doubt5 | doubt6 | doubt234
         # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
         # common direction; about that joint 4 takes whatever angle is left
         across, height = self.three_link.miss(pairs, p)
         along = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
-        aside = height * scale + distance2(along, [0.0, 0.0, self.three_link.sense4])
-        miss = across * scale + aside
-        return Candidates([first, *pairs, fifth, sixth], doubt, miss, [None, *angles, None, None])
+        aside = height * scale + sub.distance2(along, [0.0, 0.0, self.three_link.sense4])
+        return Candidates([first, *pairs, fifth, sixth], doubt, across * scale + aside, [None, *angles, None, None])
+
+    def _shoulder_joint(self, D: Pose, prefer: Pair | None) -> tuple[Pair, Doubt]:
+        """Joint 1: where axes 5 and 6 meet has a known height along n. D: joint 6's frame seen from joint 1."""
+        n, o = self.shoulder[6:9], self.shoulder[9:12]
+        g = arrays.combine(1.0, D[9:12], self.height6, D[6:9])
+        a = arrays.add(arrays.mul(n[0], g[0]), arrays.mul(n[1], g[1]))
+        b = arrays.sub(arrays.mul(n[0], g[1]), arrays.mul(n[1], g[0]))
+        right = arrays.sub(self.along + arrays.dot(n, o), arrays.mul(n[2], g[2]))
+        return sub.linear(a, b, right, 0, self.scale, prefer)
+
+    def _wrist_joints(self, n: Sequence[Entry], prefer: Prefer) -> tuple[tuple[Pair, Doubt], tuple[Pair, Doubt]]:
+        """Joint 5 from the angle between n, seen from joint 6, and axis 6; joint 6 from n itself: Rz(-q6) v = n."""
+        disc = n[0] * n[0] + n[1] * n[1] if self.orthogonal else None
+        # an oblique wrist's two roots merge whole
+        tangent = sub.precision().sharp if self.orthogonal else sub.precision().tangent
+        fifth, doubt5 = sub.linear(self.cos5, self.sin5, n[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
+        (c5, s5), m = fifth, self.m
+        mx = arrays.add(arrays.mul(c5, m[0]), arrays.mul(s5, m[1]))
+        my = arrays.sub(arrays.mul(c5, m[1]), arrays.mul(s5, m[0]))
+        v = pose.turn_back(self.B, [mx, my, m[2]])
+        return (fifth, doubt5), sub.rotation_between(n[0], n[1], v[0], v[1], 1.0, prefer[5], disc)
 
 
 def _turned_back(c: Entry, s: Entry, v: Sequence[Entry]) -> list[Entry]:

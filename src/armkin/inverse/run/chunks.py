@@ -84,15 +84,13 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
     return batch, math.prod(runner.axes), target, rounding, edge
 
 
-def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Array], near: Array, hits: Int) -> Doubted:
+def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, hits: Int) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
     targets on an edge.
 
     hits: `near_itself.at_tip`, none where that is not asked.
     """
     arm = goals.arm
-    doubt: Any  # flags
-    free: Any
     *values, miss, doubt, free = outputs
     N = len(part.q)
     shape, B = (*axes, N), math.prod(axes)
