@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 import armkin
+from armkin.formula.arrays import Array
 from armkin.inverse.closed import crossings
 from armkin.inverse.numeric import newton
+from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import LABELS
 from armkin.model.target_numbers import targets_in
 
@@ -26,6 +28,11 @@ FLAT = [0.8487981197583796, -1.5834526887369684, 1.617782823941284, 0.3378108023
         -2.4097472431493117]  # fmt: skip
 BENDS = [-0.25593536604020745, -1.74843120996385, 1.6179598106092539, 2.394289170403917, 0.004527652638556409,
          2.2178298192062207]  # fmt: skip
+# Wrists 1.5e-7 and 1.4e-6 rad off straight, whose self-motions go half a turn and end
+HALF_TURNS = [1.710007560461471, -3.141592645536817, -1.524345424490568, -0.7853981657546913, -3.1415925010943075,
+              -2.3561944723909973]  # fmt: skip
+ALONE = [-2.3561944768073277, -3.14301958993539, -1.5239035805240875, 0.9905624072906454, -3.141594046209012,
+         2.8890822198705735]  # fmt: skip
 
 
 @pytest.mark.parametrize("neighbours", [0, 60])
@@ -123,3 +130,34 @@ def test_what_bends_within_a_shortened_span_is_followed_to_its_ends() -> None:
     assert solutions.status == armkin.Status.SINGULAR
     assert len(rows) == 4
     np.testing.assert_allclose(np.sort(rows[:, 2]), [1.6175887, 1.6175887, 1.6179598, 1.6179598], atol=1e-6)
+
+
+def test_self_motions_that_end_half_a_turn_on_are_rows_of_their_own() -> None:
+    """Their curves were not followed to the ends, and each was one row with that of the wrist turned over."""
+    arm = armkin.load("puma560")
+    for q, count in ((HALF_TURNS, 8), (ALONE, 4)):
+        T = armkin.fk(arm, q)
+        solutions = armkin.ik(arm, T[None].repeat(3, axis=0))
+        assert (solutions.valid.sum(axis=1) == count).all()
+        assert solutions.complete.all()
+        rows = solutions.q[0][solutions.valid[0]]
+        turned = np.abs(newton.difference(arm, rows[:, None], rows[None]))
+        flips = (np.abs(turned[:, :, [3, 5]] - np.pi) < 1e-5).all(axis=2) & (turned[:, :, :3] < 1e-5).all(axis=2)
+        assert flips.sum() == count
+        for way in (np.pi, -np.pi):
+            assert _least_misses(arm, T, rows, 3, way).max(axis=0).min() > 1.5e-9
+
+
+def _least_misses(arm: armkin.Arm, T: Array, q: Array, joint: int, way: float) -> Array:
+    """What postures (M, n) miss at least, as a joint goes a way in 400 steps, the others free: (401, M)."""
+    q, goals, misses = q.copy(), T[None].repeat(len(q), axis=0), []
+    task = task_for(arm)
+    start = q[:, joint].copy()
+    for share in np.linspace(0.0, 1.0, 401):
+        q[:, joint] = start + share * way
+        for _ in range(6):
+            r, J = newton.scaled(arm, task, q, goals)
+            step = np.linalg.pinv(np.delete(J, joint, axis=2), rcond=1e-7) @ r[:, :, None]
+            q += np.insert(step[:, :, 0], joint, 0.0, axis=1)
+        misses.append(newton.misses(arm, task, q, goals))
+    return np.array(misses)

@@ -7,6 +7,8 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+import numpy as np
+
 from armkin.export.c import arm_formulas, c_elimination, c_functions, c_program, keep_out_tables
 from armkin.export.c.source_parts import part_text
 from armkin.formula.c_and_js_code import number_text
@@ -160,14 +162,17 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "close_by": CLOSE_BY, "smooth": SMOOTH, "bent": BENT, "wide": REACH, "way": FOLD_WAY,
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "error": ERROR, "high": HIGH,
         "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED, "drift": DRIFT,
+        "nearer": local_structure.NEARER, "shorter": local_structure.SHORTER, "longest": local_structure.LONGEST,
+        "gain": local_structure.BOTH_WAYS.gain,
     }  # fmt: skip
     named = {name: number_text(value) for name, value in values.items()}
     named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
     named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
     named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
     named |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
-    tables = {"nodes": local_structure.NODE, "points": local_structure.POINTS}
-    tables |= {"fit": local_structure.TO_POWERS, "last": local_structure.TO_LAST}
+    tables = {"points": local_structure.POINTS, "last": local_structure.TO_LAST}
+    sides = local_structure.BOTH_WAYS, local_structure.AHEAD
+    tables |= {"nodes": np.stack([side.node for side in sides]), "fit": np.stack([side.to_powers for side in sides])}
     named |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
     named |= {
         "nodes_count": str(local_structure.NODES),
@@ -175,7 +180,6 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "few_links": str(chains.FEW_LINKS),
         "along": str(self_motions.LINE_JOINTS),
     }
-    named |= dict(zip(("shorter", "longer"), map(number_text, local_structure.LENGTH_RATIO), strict=True))
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
     named["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
     named["sums"] = str(len(sums))

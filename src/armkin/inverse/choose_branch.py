@@ -115,7 +115,8 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     near = units.joints_in(arm, request.near_out)
     collected = [_SweptTarget() for _ in targets]
     more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
-    for held in _held_combinations(request):
+    for swept in itertools.product(*request.swept.values()):
+        held = _held_values(arm, {**request.held, **dict(zip(request.swept, swept, strict=True))})
         one, goals = without_held(arm, request.task, held, targets)
         s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **more)
         wanted_names = set(s.names)
@@ -238,12 +239,6 @@ def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> i
     free = (i for i, (branch, named) in enumerate(branches) if named and branch.may_be_taken)
     hit = (i for i, (branch, named) in enumerate(branches) if named and branch.within_limits and request.ignore)
     return next(free, next(hit, None))
-
-
-def _held_combinations(request: Request) -> Iterator[dict[str, float]]:
-    """Every combination of held and swept joints [rad | mm]; one empty one if there are none."""
-    for choice in itertools.product(*request.swept.values()):
-        yield _held_values(request.arm, {**request.held, **dict(zip(request.swept, choice, strict=True))})
 
 
 def _held_values(arm: Arm, held: Mapping[str, float]) -> dict[str, float]:

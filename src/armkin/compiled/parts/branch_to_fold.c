@@ -66,12 +66,12 @@ ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, cons
 ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const double *u, const double *w, arm_branch *out,
     double *g)
 {
-    static const double unit[ARM_JOINTS] = {@unit@}, node[ARM_NODES] = {@nodes@};
-    static const double fit[ARM_NODES][ARM_NODES] = {@fit@}, last[2][ARM_NODES] = {@last@};
+    static const double unit[ARM_JOINTS] = {@unit@}, nodes[2][ARM_NODES] = {@nodes@};
+    static const double fits[2][ARM_NODES][ARM_NODES] = {@fit@}, last[2][ARM_NODES] = {@last@};
     double away[ARM_NODES][ARM_JOINTS + 1], at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS];
     double regular[ARM_NODES], before[ARM_NODES] = {0.0}, step, steepest = 0.0, off = 0.0;
+    const double *node = nodes[out->only_ahead], (*fit)[ARM_NODES] = fits[out->only_ahead];
     int i, j, k, round, there[ARM_NODES] = {0}, open = ARM_NODES;
-    out->longer = @shorter@;
     for (i = 0; i < ARM_NODES; i++)
         for (j = 0; j < ARM_JOINTS; j++) {
             const double t = node[i] * out->span;
@@ -109,7 +109,7 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             off = fmax(off, fabs(c) / most);
         }
     }
-    out->longer = fmin(fmax(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @shorter@), @longer@);
+    out->longer = (out->only_ahead ? 1.0 : @gain@) * fmin(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @longest@) - @nearer@;
     if (!(off < 1.0)) /* the polynomials are exact on the span if their last coefficients are small */
         return 0;
     for (j = 0; j <= ARM_JOINTS; j++) {
@@ -158,9 +158,9 @@ ARM_SELDOM static double arm_mark_moves(arm_branch *out)
 ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
 {
     static const double point[@points_count@] = {@points@};
-    double ends[2] = {1.0, 1.0}, rise[@fine@], steepest = 0.0;
+    double ends[2] = {!out->only_ahead, 1.0}, rise[@fine@], steepest = 0.0;
     int i, j, k, way, over[2] = {0, 0};
-    for (way = 0; way < 2; way++)
+    for (way = out->only_ahead; way < 2; way++)
         for (i = 1; !over[way] && i < @points_count@; i++)
             if (fabs(arm_value(g, 1, way ? point[i] : -point[i], 0)) > @solution@) {
                 double low = point[i - 1], high = point[i];
@@ -202,46 +202,48 @@ ARM_SELDOM static int arm_leaves(const arm_branch *one, const double *from, int 
     return (way > 0 ? one->high : -one->low) >= one->span;
 }
 
-/* A further curve of branch self's component, begun where the one before left its span, and what it adds to out, which began
-   at `at`. 1 if the component ends on it, 0 if it goes on, -1 if nothing more can be told of it. */
-ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, int self, double *q, double *ahead, double *span,
-    arm_branch *out)
+/* A further curve of branch self's component, begun at q where the one before left its span, and what it adds to out, which began
+   at `at`. other: where the other side is, 0 where that has ended. 1 if the component ends on it, 2 if it closes, as the two sides
+   meet, 0 if it goes on, -1 if nothing more can be told of it. */
+ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, int self, const double *other, double *q,
+    double *ahead, double *span, arm_branch *out)
 {
     static const double straight[ARM_JOINTS] = {0.0};
-    double T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], g[ARM_NODES], way[ARM_JOINTS], sense[2] = {0.0, 0.0};
+    double T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS], g[ARM_NODES], way[ARM_JOINTS], sense = 0.0;
     double A[ARM_JOINTS][ARM_JOINTS], V[ARM_JOINTS][ARM_JOINTS], S[ARM_JOINTS];
     const int last = ARM_JOINTS - 1;
     arm_branch link;
-    int b, j, home, good;
+    int b, j, met, good;
     arm_pose(q, T, 1);
     arm_slope(q, slope, 1);
     arm_singular_values(slope, A, V, S);
-    link.span = *span, link.second = S[last - 1];
+    link.span = *span, link.second = S[last - 1], link.only_ahead = 1;
     if (!(link.second > @high@) || !(S[last] > 0.0))
         return -1;
     for (j = 0; j < ARM_JOINTS; j++)
-        link.v[j] = V[last][j];
+        sense += V[last][j] * ahead[j];
+    for (j = 0; j < ARM_JOINTS; j++)
+        link.v[j] = sense < 0.0 ? -V[last][j] : V[last][j];
     good = arm_polynomials(q, goal, A[last], straight, &link, g);
-    *span *= good ? link.longer : fmin(link.longer, 0.5);
+    *span *= good ? link.longer : @shorter@;
     if (!good)
         return 0;
     arm_decided(g, &link);
-    for (home = b = 0; b < count; b++) {
+    for (b = 0; b < count; b++) {
         arm_way(at + b, q, way);
-        if (!arm_member(&link, way))
+        if (b == self || !arm_member(&link, way))
             continue;
-        if (out->partial && b != self && !out->on[b]) /* Python may list both */
+        if (out->partial && !out->on[b]) /* Python may list both */
             return -1;
-        home |= b == self, out->on[b] |= b != self;
+        out->on[b] = 1;
     }
+    met = other && (arm_way(other, q, way), arm_member(&link, way));
     arm_way(at + self, q, way);
-    for (j = 0; j < ARM_JOINTS; j++) { /* it closes where it meets the posture again in its own sense */
-        sense[0] += way[j] * link.v[j], sense[1] += ahead[j] * link.v[j];
+    for (j = 0; j < ARM_JOINTS; j++)
         out->least[j] = fmin(out->least[j], link.least[j] - way[j]), out->most[j] = fmax(out->most[j], link.most[j] - way[j]);
-    }
     out->alone &= link.alone, out->turns |= link.turns;
-    good = arm_leaves(&link, q, sense[1] > 0.0 ? 1 : -1, q, ahead);
-    return !good || (home && sense[0] * sense[1] > 0.0);
+    good = arm_leaves(&link, q, 1, q, ahead);
+    return met ? 2 : !good;
 }
 
 /* A component that leaves its span, followed both ways in turn until it ends, or closes; farther if it is known that it is a
@@ -257,9 +259,10 @@ ARM_SELDOM static int arm_chained(const double *goal, const double *at, int coun
     for (links = 1; links <= (out->motion ? @links@ : @few_links@) && !(ended[0] && ended[1]); links++) {
         for (side = 0; side < 2; side++) {
             if (!ended[side])
-                ended[side] = arm_link(goal, at, count, self, q[side], ahead[side], span + side, out);
+                ended[side] = arm_link(goal, at, count, self, ended[!side] ? 0 : q[!side], q[side], ahead[side], span + side, out);
             if (ended[side] < 0)
                 return 0;
+            ended[!side] |= ended[side] == 2;
         }
         if (!out->motion) {
             out->motion = arm_mark_moves(out) >= @wide@;

@@ -4,12 +4,13 @@
 enum { ARM_NODES = @nodes_count@ };
 
 /* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. longer: times as long a span is likely to
-   hold. least, most: how far the joints' ways go. motion: whether it is a self-motion, moves: of which joints, alone: no other
-   curve crosses it, partial: Python does not follow it to its ends, on: which other branches lie on further curves of it. */
+   hold. only_ahead: the span begins at t = 0. least, most: how far the joints' ways go. motion: whether it is a self-motion,
+   moves: of which joints, alone: no other curve crosses it, partial: Python does not follow it to its ends, on: which other
+   branches lie on further curves of it. */
 typedef struct {
     double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, longer, sigma, second, miss;
     double least[ARM_JOINTS], most[ARM_JOINTS];
-    int weak, turns, motion, moves[ARM_JOINTS], alone, partial, on[ARM_BRANCHES];
+    int weak, turns, motion, only_ahead, moves[ARM_JOINTS], alone, partial, on[ARM_BRANCHES];
 } arm_branch;
 
 #if @sums@
@@ -243,7 +244,8 @@ ARM_SELDOM static int arm_told(const double *at, int count, int self, const doub
     if (!(out->miss < @closed@)) /* a branch that misses by more wants a correction */
         return 0;
     arm_singular_values(slope, A, V, S);
-    out->weak = S[last] < @folded@, out->turns = out->motion = out->partial = 0, out->sigma = S[last], out->second = S[last - 1];
+    out->turns = out->motion = out->partial = out->only_ahead = 0;
+    out->weak = S[last] < @folded@, out->sigma = S[last], out->second = S[last - 1];
     if (!out->weak)
         return 1;
     if (!(S[last - 1] > @lost@)) /* two directions are lost */

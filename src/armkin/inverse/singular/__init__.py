@@ -4,7 +4,7 @@ local_structure.py     the residual along the direction that a posture loses, an
 chains.py              manifolds on which the residual grows, followed from end to end
 components.py          candidates of targets on an edge: which are one, isolated, a boundary or a self-motion manifold
 linkages.py            self-motions of two joints about one line and of four bars, at once
-high_order_roots.py    roots of high order: which candidates are one
+high_order_roots.py    roots of high order: which candidates are one, which show that none is in reach
 self_motions.py        whether joints can move while the target is kept, and what lies on one self-motion
 meetings.py            postures in which self-motions meet, replaced by one of each
 curves.py              one-dimensional solution sets, followed, and which postures share a circuit of one

@@ -16,7 +16,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
 FEW_LINKS = 4  # curves on each side of a posture whose component leaves a shortened span: others are decided elsewhere
-LINKS = 12  # curves on each side of a posture, each as long as the last one lets expect, or half where that fails
+LINKS = 16  # curves on each side of a posture, each as long as the last one lets expect
 
 
 def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
@@ -44,24 +44,26 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     for count in range(1, LINKS + 1):
         if not len(going):
             break
-        row, rows = curve[going], np.arange(len(going))
-        last, way = start[going], ahead[going]
-        link = stretch(arm, task, last, target[row], span[going])
+        row, rows, last = curve[going], np.arange(len(going)), start[going]
+        link = stretch(arm, task, last, target[row], span[going], ahead[going])
         good = link.followed & (link.second > tol.HIGH)
-        span[going] *= np.where(good, link.longer, np.minimum(link.longer, 0.5))
-        # a curve closes where it meets `q` itself again, in its own sense
-        apart = newton.difference(arm, np.concatenate([peers[row], q[row, None]], axis=1), last[:, None])
-        passed = members(link, rows, apart) & good[:, None]
-        np.logical_or.at(inside, row, passed[:, :-1])
-        home = passed[:, -1] & ((apart[:, -1] * link.v).sum(axis=1) * (way * link.v).sum(axis=1) > 0.0)
+        span[going] *= link.longer
+        onto, onwards = leave_spans(arm, link, rows, last, link.v)
+        # a curve closes where its two sides meet: a step may pass where the other was, or now is
+        other = (going + len(left)) % len(curve)
+        before = start[other]
+        start[going[good]], ahead[going[good]] = onto[good], onwards[good]
+        others = np.concatenate([peers[row], before[:, None], start[other][:, None]], axis=1)
+        passed = members(link, rows, newton.difference(arm, others, last[:, None])) & good[:, None]
+        np.logical_or.at(inside, row, passed[:, :-2])
         shift = newton.difference(arm, last, q[row])
         np.minimum.at(least, row[good], (shift + link.least)[good])
         np.maximum.at(most, row[good], (shift + link.most)[good])
         np.logical_and.at(alone, row[good], link.alone[good])
         np.logical_or.at(at.boundary, row[good], link.boundary[good])
-        onto, onwards = leave_spans(arm, link, rows, last, way)
-        start[going[good]], ahead[going[good]] = onto[good], onwards[good]
-        finished[going] = good & (home | np.isnan(onto[:, 0]))
+        finished[going] = good & np.isnan(onto[:, 0])
+        met = passed[:, -2:].any(axis=1)
+        finished[going[met]] = finished[other[met]] = True
         enough = ~at.known & ((count == FEW_LINKS) | ((most - least).max(axis=1) >= tol.REACH))
         going = going[~(finished[going] | enough[row]) & (link.second > tol.HIGH)]
     extent, ended[left] = (most - least)[left], finished.reshape(2, -1).all(axis=0)

@@ -21,7 +21,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import chains, curves, high_order_roots, meetings, self_motions
-from armkin.inverse.singular.local_structure import beyond_folds, local_structure
+from armkin.inverse.singular.local_structure import local_structure
 
 AT_ONCE = 128  # candidates from which on asking all together is cheaper than one after the other
 FEW_CANDIDATES = 24  # candidates of a target that are compared all with all
@@ -346,7 +346,7 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     if len(free):
         rows = free[size[free] < most]
         far = rows[size[rows] > tol.SOLUTION]
-        beyond[far] = beyond_folds(arm, task, flat[far], target[goal[far]])
+        beyond[far] = high_order_roots.beyond_folds(arm, task, flat[far], target[goal[far]])
         rows = rows[~beyond[rows]]
         # towards a root of third order each step goes a third of the way
         flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)

@@ -82,12 +82,6 @@ class Curves:
         return step
 
 
-def curve_directions(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Bool]:
-    """Directions (M, n) of curves through postures q (M, n), moving joints (M, n); which are crossings (M,)."""
-    _, V, second, _ = _onto_curve(arm, task, q, joints, target)
-    return V[:, :, 0], np.asarray(second < tol.CROSSING)
-
-
 def _longest_steps(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
     return np.asarray(np.where(second < tol.CROSSING, CROSSING_STEP, np.minimum(STEP, BEND * second)))
@@ -136,8 +130,8 @@ def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array,
         same[k, c] = side[0] == side[1]
         compared = compared & ~is_linkage[:, None]
     curve, column = np.nonzero(compared)
-    ahead, crossing = curve_directions(arm, task, q, joints, target)
-    met = crossing[curve]
+    _, V, second, _ = _onto_curve(arm, task, q, joints, target)
+    ahead, met = V[:, :, 0], np.asarray(second < tol.CROSSING)[curve]
     if len(open_ := np.flatnonzero(~met)):
         rows, place = np.unique(curve[open_], return_inverse=True)
         twice = np.tile(rows, 2)

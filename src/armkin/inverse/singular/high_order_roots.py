@@ -1,4 +1,4 @@
-"""Roots of high order: what rounding makes of one, and which of those are one branch.
+"""Roots of high order: what rounding makes of one, which of those are one branch, and what shows that none is in reach.
 
 Near such a root the residual hardly grows along a curve, and rounding leaves as many candidates as its order. Two are
 one branch if a posture between them solves the target as well: the one half way, or, where the curve bends, the one
@@ -68,3 +68,26 @@ def equal_candidates(
 def _radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
     return np.asarray(tol.SAME + np.minimum(tol.ERROR / np.maximum(sigma, tol.TINY), tol.DOUBLE_ROOT))
+
+
+def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
+    """Which postures (M, n), close to their targets, show that these are out of reach there: (M,).
+
+    To second order the tool moves along the direction u that the Jacobian cannot reach by half of `bend` times the
+    square of the way. A residual along u of the same sign is one that no motion takes anything away of; what else is
+    missing must be so little that putting it right does not lead back.
+    """
+    if not (task.constraints == arm.n > 1 and task.orientation != "axis" and len(q)):
+        return np.zeros(len(q), bool)
+    r, J = newton.scaled(arm, task, q, target)
+    U, S, V = np.linalg.svd(J)
+    u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
+    ends = np.concatenate([q + way, q - way])
+    goals = np.concatenate([target, target])
+    ahead, behind = np.split(newton.residuals(arm, task, ends, goals), 2)
+    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
+    lost = (u * r).sum(axis=1)
+    remainder = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
+    fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
+    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * tol.SOLUTION)
+    return np.asarray(fold & beyond & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(lost)))

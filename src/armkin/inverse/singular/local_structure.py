@@ -25,7 +25,8 @@ NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev nod
 ITERATIONS = 8  # Newton steps onto the curve
 SHRINK = 8  # factor by which a span is shortened where a curve turns away within it
 SHRINKS = 3  # times that a span is shortened at most
-LENGTH_RATIO = 0.25, 2.0  # length of a span, at least and at most, relative to the last one
+SHORTER, LONGEST = 0.35, 2.0  # length of a span relative to the last one, if that does not hold, and at most
+NEARER = 0.5  # share of a span by which what bounds the next one has come nearer
 STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(tol.FIRST_POINT, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
@@ -68,6 +69,16 @@ class Structure(NamedTuple):
     g: Array
 
 
+class Side(NamedTuple):
+    """Nodes of a span and where it begins, as shares of it; from values at these to coefficients of the powers; and how
+    many times as long a span ahead is as exact."""
+
+    node: Array
+    to_powers: Array
+    low: float
+    gain: float
+
+
 def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton.Linear | None = None) -> Structure:
     """The structure at postures (M, n) that solve their targets (M, m) or (M, 4, 4); at least n numbers a target.
 
@@ -90,7 +101,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     for _ in range(SHRINKS + 2):
         if not len(left):
             break
-        stays = _follow(arm, task, q, target, U, V, w, curve, left)
+        stays = _follow(arm, task, q, target, U, V, w, curve, left, BOTH_WAYS)
         # where two directions are all but lost no shorter span helps; what leaves a span leaves shorter ones
         left = left[~curve.known[left] & (curve.second[left] > tol.HIGH) & (short[left] | ~stays)]
         curve.span[left] = np.where(short[left], full[left], curve.span[left] / SHRINK)
@@ -98,12 +109,13 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
     return curve
 
 
-def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array) -> Structure:
-    """The curves through postures (M, n) as far as span (M,)."""
+def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array, ahead: Array) -> Structure:
+    """The curves through postures (M, n), the way that ahead (M, n) points, as far as span (M,)."""
     linear = newton.Linear.linearise(arm, task, q, target)
+    linear.V[(linear.V[:, -1] * ahead).sum(axis=1) < 0.0, -1] *= -1.0
     curve = _structure_of_jacobians(linear)
     curve.span[...] = span
-    _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)))
+    _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)), AHEAD)
     return curve
 
 
@@ -133,19 +145,19 @@ def leave_spans(arm: Arm, structure: Structure, rows: Int, q: Array, ahead: Arra
 
 
 def _follow(
-    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, curve: Structure, rows: Int
+    arm: Arm, task: Task, q: Array, target: Array, U: Array, V: Array, w: Array, curve: Structure, rows: Int, side: Side
 ) -> Bool:
     """Follow the curves of some postures as far as their spans, and write what those tell that stay at hand (m,)."""
     n = q.shape[1]
     span, u = curve.span[rows], U[rows, :, n - 1 :]
-    stays, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span)
+    stays, longer, alone, x, g = _polynomials(arm, task, q[rows], target[rows], u, V[rows, -1], w[rows], span, side)
     # Newton's method may have found another curve close by: then x(0) is not the posture
     slack = tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
     stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + slack)
-    held, curve.longer[rows], curve.followed[rows] = rows[stays], longer, stays
+    held, curve.longer[rows], curve.followed[rows] = rows[stays], np.where(stays, longer, SHORTER), stays
     if len(held):
         curve.x[:, held], curve.g[:, held], curve.alone[held] = x[:, stays], g[:, stays], alone[stays]
-        _decide(curve, held)
+        _decide(curve, held, side)
     return stays
 
 
@@ -207,7 +219,7 @@ def _second_order(
 
 
 def _polynomials(
-    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
+    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array, side: Side
 ) -> tuple[Bool, Array, Bool, Array, Array]:
     """Which curves (M,) stay at hand as far as their spans, how many times as long spans they may (M,), on which of
     these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k).
@@ -216,23 +228,24 @@ def _polynomials(
     derivative, as far as it is known; span: (M,).
     """
     n, rows = q.shape[1], u.shape[1]
-    on, x, along_u, inverse = _nodes(arm, task, q, target, u, v, w, span)
+    on, x, along_u, inverse = _nodes(arm, task, q, target, u, v, w, span, side)
     # along the curve u turns: the inverse's last rows span what no motion across v reaches there
     g = _least_residual(inverse[:, :, n:, :rows], along_u)
-    chebyshev = np.tensordot(_FIT, np.concatenate([x, g], axis=2), axes=1)
-    # the polynomials are exact on the span if their last coefficients are small
-    last = np.abs(chebyshev[-2:]).max(axis=0)
+    values = np.concatenate([x, g], axis=2)
+    # the polynomials are exact on the span if the last coefficients of their Chebyshev series are small
+    last = np.abs(np.tensordot(TO_LAST, values, axes=1)).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         off = np.maximum(last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION))
         # the last coefficients grow with the span to that power
-        longer = np.where(on, np.clip(0.9 * off ** (1.0 / (2 - NODES)), *LENGTH_RATIO), LENGTH_RATIO[0])
+        longer = side.gain * np.minimum(0.9 * off ** (1.0 / (2 - NODES)), LONGEST) - NEARER
         on &= off < 1.0
-    power = np.tensordot(_POWERS, chebyshev, axes=1)
-    return np.asarray(on), longer, _crossed_by_none(inverse, span), power[:, :, :n], power[:, :, n:]
+    power = np.tensordot(side.to_powers, values, axes=1)
+    alone = _crossed_by_none(inverse, np.multiply.outer(-np.diff(side.node), span))
+    return np.asarray(on), longer, alone, power[:, :, :n], power[:, :, n:]
 
 
 def _nodes(
-    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array
+    arm: Arm, task: Task, q: Array, target: Array, u: Array, v: Array, w: Array, span: Array, side: Side
 ) -> tuple[Bool, Array, Array, Array]:
     """Nodes of the curves of `_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
     the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
@@ -242,7 +255,7 @@ def _nodes(
     """
     M, n = q.shape
     rows, k = u.shape[1:]
-    t, unit = np.multiply.outer(NODE, span)[:, :, None], radian_or_reach(arm)
+    t, unit = np.multiply.outer(side.node, span)[:, :, None], radian_or_reach(arm)
     x = t * (v + 0.5 * t * w)
     inverse, along_u = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
     bordered = np.zeros(inverse.shape)
@@ -270,14 +283,13 @@ def _nodes(
     return on, x, along_u, inverse
 
 
-def _crossed_by_none(inverse: Array, span: Array) -> Bool:
+def _crossed_by_none(inverse: Array, apart: Array) -> Bool:
     """Which curves (M,) no other one crosses within their spans.
 
     A crossing is a zero of the bordered Jacobian's smallest singular value, which no two nodes are as close to as it
-    changes between any two; inverse: of these Jacobians at the nodes.
+    changes between any two; inverse: of these Jacobians at the nodes, which are apart (NODES - 1, M).
     """
     weakest = 1.0 / np.sqrt((inverse * inverse).sum(axis=(2, 3)))
-    apart = np.multiply.outer(-np.diff(NODE), span)
     steepest = (np.abs(np.diff(weakest, axis=0)) / apart).max(axis=0)
     return np.asarray((weakest[1:] + weakest[:-1] > 2.0 * steepest * apart).all(axis=0))
 
@@ -294,7 +306,10 @@ _FIT = np.linalg.inv(np.polynomial.chebyshev.chebvander(NODE, NODES - 1))
 _POWERS = np.array([
     np.pad(np.polynomial.chebyshev.cheb2poly([0.0] * k + [1.0]), (0, NODES))[:NODES] for k in range(NODES)
 ]).T  # fmt: skip
-TO_POWERS, TO_LAST = _POWERS @ _FIT, _FIT[-2:]  # from values at the nodes: coefficients, and the last two
+_SHIFT = np.array([np.pad(np.polynomial.polynomial.polypow([-1.0, 2.0], k), (0, NODES - 1 - k)) for k in range(NODES)])
+BOTH_WAYS = Side(NODE, _POWERS @ _FIT, -1.0, 1.32)
+AHEAD = Side(0.5 * (NODE + 1.0), _SHIFT.T @ _POWERS @ _FIT, 0.0, 1.0)
+TO_LAST = _FIT[-2:]
 
 
 def _values(coefficients: Array, s: Array) -> Array:
@@ -329,11 +344,11 @@ def _ends_of_components(g: Array) -> tuple[Array, Bool]:
     return shares.reshape(2, M), ends.reshape(2, M)
 
 
-def _decide(curve: Structure, rows: Int) -> None:
+def _decide(curve: Structure, rows: Int, side: Side) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
     g, x, span = curve.g[:, rows], curve.x[:, rows], curve.span[rows]
     (low, high), (below, above) = _ends_of_components(g)
-    low = -low
+    low *= side.low
     s = low + FINE_GRID * (high - low)  # (points, M)
     way = _values(x, s)
     curve.least[rows], curve.most[rows] = way.min(axis=0), way.max(axis=0)
@@ -362,26 +377,3 @@ def members(structure: Structure, rows: Int, way: Array) -> Bool:
     beside = np.abs(way - x).max(axis=2)
     inside = (t >= (structure.low[rows] - slack)[:, None]) & (t <= (structure.high[rows] + slack)[:, None])
     return np.asarray(structure.followed[rows, None] & inside & (beside <= (4.0 * tol.SMOOTH * span + slack)[:, None]))
-
-
-def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
-    """Which postures (M, n), close to their targets, show that these are out of reach there: (M,).
-
-    To second order the tool moves along the direction u that the Jacobian cannot reach by half of `bend` times the
-    square of the way. A residual along u of the same sign is one that no motion takes anything away of; what else is
-    missing must be so little that putting it right does not lead back.
-    """
-    if not (task.constraints == arm.n > 1 and task.orientation != "axis" and len(q)):
-        return np.zeros(len(q), bool)
-    r, J = newton.scaled(arm, task, q, target)
-    U, S, V = np.linalg.svd(J)
-    u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
-    ends = np.concatenate([q + way, q - way])
-    goals = np.concatenate([target, target])
-    ahead, behind = np.split(newton.residuals(arm, task, ends, goals), 2)
-    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
-    lost = (u * r).sum(axis=1)
-    remainder = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
-    fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
-    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * tol.SOLUTION)
-    return np.asarray(fold & beyond & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(lost)))

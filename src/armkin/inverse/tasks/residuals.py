@@ -9,6 +9,7 @@ from armkin.inverse.tasks.task import NO_DIRECTION, Task
 
 SMALL_TURN = 1e-8  # largest difference of a small rotation's trace from 3
 HALF_TURN = 1e-6  # a rotation by nearly half a turn has a smaller sine
+ABOVE, BELOW = np.array([5, 6, 1]), np.array([7, 2, 3])  # where rotations (3, 3) have the sines of their axes
 TINY = 1e-300  # floor of divisors, which keeps quotients finite
 
 
@@ -22,12 +23,11 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
         difference[:, :3] = (target[:, :3, 3] - T[:, :3, 3]) / unit
         # half the sum of the columns' vector products is the rotation vector to third order
         R, back = T[:, :3, :3], np.swapaxes(target[:, :3, :3], 1, 2)
-        C = np.ascontiguousarray(R) @ np.ascontiguousarray(back)  # views take three times as long
-        for k, (i, j) in enumerate(((1, 2), (2, 0), (0, 1))):
-            difference[:, 3 + k] = 0.5 * (C[:, i, j] - C[:, j, i])
-        is_large = C[:, 0, 0] + C[:, 1, 1] + C[:, 2, 2] < 3.0 - SMALL_TURN
-        if is_large.any():
-            difference[is_large, 3:] = _rotation_vector(np.swapaxes(C[is_large], 1, 2))
+        C = (np.ascontiguousarray(R) @ np.ascontiguousarray(back)).reshape(-1, 9)  # views take three times as long
+        difference[:, 3:] = 0.5 * (C.take(ABOVE, axis=1) - C.take(BELOW, axis=1))
+        trace = C[:, 0] + C[:, 4] + C[:, 8]
+        if (trace < 3.0 - SMALL_TURN).any():
+            difference[:, 3:] = _rotation_vectors(difference[:, 3:], trace, C)
         return difference
     parts = [(target[:, : task.position] - T[:, : task.position, 3]) / unit]
     if len(task.sums):
@@ -63,17 +63,15 @@ def task_jacobian(task: Task, J: Array, T: Array) -> Array:
     return np.concatenate(parts, axis=1)
 
 
-def _rotation_vector(R: Array) -> Array:
-    """Rotation vectors of rotation matrices (M, 3, 3), accurate also near half a turn."""
-    w = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    s = np.linalg.norm(w, axis=1)
-    c = 0.5 * (np.trace(R, axis1=1, axis2=2) - 1.0)
-    angle = np.arctan2(s, c)
-    near_half = s < HALF_TURN
+def _rotation_vectors(w: Array, trace: Array, C: Array) -> Array:
+    """Rotation vectors of matrices C' (M, 9), accurate also near half a turn; w: (M, 3) axes as long as the sines."""
+    s = np.sqrt((w * w).sum(axis=1))
+    angle = np.arctan2(s, 0.5 * (trace - 1.0))
+    near_half = (s < HALF_TURN) & (trace < 0.0)
     if near_half.any():
-        B = R[near_half] + np.eye(3)
-        k = np.argmax(np.einsum("mij,mij->mj", B, B), axis=1)
-        axis = B[np.arange(len(B)), :, k]
+        B = C[near_half].reshape(-1, 3, 3) + np.eye(3)
+        k = np.argmax(np.einsum("mji,mji->mj", B, B), axis=1)
+        axis = B[np.arange(len(B)), k]
         w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
-        s = np.where(near_half, 1.0, s)
-    return np.asarray(w * (angle / np.maximum(s, TINY))[:, None])
+        s[near_half] = 1.0
+    return np.asarray(w * np.where(trace < 3.0 - SMALL_TURN, angle / np.maximum(s, TINY), 1.0)[:, None])
