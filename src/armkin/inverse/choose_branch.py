@@ -1,7 +1,7 @@
-"""One answer a target: joints held or swept, branches of the whole arm sorted, one chosen, or why none is.
+"""One answer for each target: the sorted branches of the whole arm, and the best one or the reason for none.
 
-`ik` gives arrays; this gives what a person or a page wants to know of each target, in mm and degrees
-(`armkin.model.units`).
+It also handles joints that are held or swept. While `ik` returns arrays, these answers are for users and pages, in mm
+and degrees (`armkin.model.units`).
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ from armkin.model import limits, units
 from armkin.model.arm import Arm
 from armkin.model.lock_joints import unlock
 
-MAX_SWEEPS = 10_000  # combinations of swept values that are tried
-_RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # the best first
-_THIN = 20  # branches of one target that are kept before those that no answer shows are dropped
-_MAX_ANSWERS = 16_384  # answers, of 6.5 kB each, of one target and one swept value that are kept at once
+MAX_SWEEPS = 10_000  # most combinations of swept values
+_RANKS = Status.EXACT, Status.BOUNDARY, Status.SINGULAR, Status.POSITION, Status.UNREACHABLE  # best first
+_THIN = 20  # with more branches of a target, those that no answer shows are dropped
+_MAX_ANSWERS = 16_384  # most answers of 6.5 kB in memory, one for each target and swept value
 
 
 @dataclass(frozen=True)
@@ -51,11 +51,11 @@ class Request:
     branch: str | None = None  # name of the branch wanted
     held: Mapping[str, float] = field(default_factory=dict)  # joint name -> value [deg | mm]
     swept: Mapping[str, Sequence[float]] = field(default_factory=dict)  # joint name -> values to try
-    ignore: bool = False  # keep-outs: a branch with hits is taken where none is free
-    position_first: bool = False  # the position exact, the rotation as near as it goes
-    every: bool = True  # keep all branches; False: of the swept values' branches those that an answer shows
-    ik: Callable[..., Solutions] = ik  # what solves: called as `armkin.ik` is
-    fk: Callable[[Arm, Array], Array] = fk  # what says where postures are: called as `armkin.fk` is
+    ignore: bool = False  # whether a branch with hits is accepted if none is free
+    position_first: bool = False  # exact position and nearest rotation
+    every: bool = True  # keep all branches; False: only those that an answer shows
+    ik: Callable[..., Solutions] = ik  # solver, called like `armkin.ik`
+    fk: Callable[[Arm, Array], Array] = fk  # forward kinematics, called like `armkin.fk`
 
     @property
     def near_out(self) -> list[float]:
@@ -85,17 +85,17 @@ class Branch(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """All there is to say about one target."""
+    """The answer for one target."""
 
     status: str
     method: str
     why: str
     complete: bool
     free: list[str]
-    branches: list[Branch]  # within limits first, of them free ones, then by motion
+    branches: list[Branch]  # those within limits first, of these the free ones, then by motion
     best: int | None
-    refused: str | None = None  # why no branch of the name asked for is the best one
-    total: int = 0  # branches found; more than `branches` where not every one is kept
+    refused: str | None = None  # why no branch of the requested name is the best one
+    total: int = 0  # number of branches found, which may exceed `branches`
     within_limits: int = 0  # number of branches within limits
     names: tuple[str, ...] = ()  # names of all branches that the arm may have
 
@@ -114,11 +114,11 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
     arm = request.arm
     near = units.joints_in(arm, request.near_out)
     collected = [_SweptTarget() for _ in targets]
-    more: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
+    options: dict[str, Any] = {"position_first": True} if request.position_first else {"rounding": rounding}
     for swept in itertools.product(*request.swept.values()):
         held = _held_values(arm, {**request.held, **dict(zip(request.swept, swept, strict=True))})
         one, goals = without_held(arm, request.task, held, targets)
-        s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **more)
+        s = request.ik(one, goals, request.task, near=near[_kept_joints(arm, held)], **options)
         wanted_names = set(s.names)
         if request.branch is not None:
             wanted_names = {s.names[i] for i in find_branches(s.names, request.branch)}
@@ -130,7 +130,7 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
 
 
 def combinations(request: Request) -> int:
-    """How many combinations of swept values are tried for each target."""
+    """The number of combinations of swept values for each target."""
     return math.prod(len(values) for values in request.swept.values())
 
 
@@ -140,32 +140,32 @@ def most_targets(request: Request) -> int:
 
 
 def locked_arm(request: Request) -> Arm:
-    """The arm that is solved: the joints that are neither held nor swept."""
+    """The arm that is solved, with the joints that are neither held nor swept."""
     held = {**request.held, **{name: values[0] for name, values in request.swept.items()}}
     return arm_without(request.arm, tuple(_held_values(request.arm, held).items()))
 
 
 def prepared_arm(request: Request) -> Arm:
-    """The arm of `locked_arm`, or one for all values that a redundant joint is held at: its targets are others."""
+    """The arm of `locked_arm`, or the arm that serves all values of a redundant joint, for transformed targets."""
     free = redundant_alone(request.arm, request.task, request.held)
     return locked_arm(request) if free is None else free.rest
 
 
 def follow_targets(request: Request, answers: Sequence[Answer]) -> Iterator[tuple[Request, Answer]]:
-    """Answers of targets along a path, each compared with the one before instead of one pose for all.
+    """Answers of targets along a path, each relative to the previous target's best branch instead of one pose.
 
-    Yields the request that holds for each target (its `near` is the best branch of the target before) and the
-    answer with the copies nearest to that, sorted and chosen anew. A target without a best branch is passed over.
+    Yields the request of each target, whose `near` is the last best branch, and the answer with the copies nearest to
+    it, sorted and chosen again. A target without a best branch does not change `near`.
     """
     held = [request.arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     for answer in answers:
         near = units.joints_in(request.arm, request.near_out)
-        nearer = (_nearest_copy(request.arm, branch, near, held) for branch in answer.branches)
-        branches = sorted(nearer, key=partial(_rank, request))
+        copies = (_nearest_copy(request.arm, branch, near, held) for branch in answer.branches)
+        branches = sorted(copies, key=partial(_rank, request))
         names = tuple(dict.fromkeys(branch.name for branch in branches))
         wanted_names = set(names)
         if request.branch is not None:
-            with suppress(UsageError):  # none of that name reaches this target
+            with suppress(UsageError):  # no branch of that name reaches this target
                 wanted_names = {names[i] for i in find_branches(names, request.branch)}
             wanted_names = wanted_names if answer.best is not None else set()
         best = _best_branch(request, [(branch, branch.name in wanted_names) for branch in branches])
@@ -175,7 +175,7 @@ def follow_targets(request: Request, answers: Sequence[Answer]) -> Iterator[tupl
 
 
 def _nearest_copy(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branch:
-    """The copy of a branch nearest to a pose (n,); held joints stay."""
+    """The copy of a branch nearest to a pose (n,); held joints keep their values."""
     rows, _ = nearest_row(arm, branch.q[None], near[None])
     q = rows[0]
     q[held] = branch.q[held]
@@ -201,28 +201,28 @@ def turns(request: Request, branch: Branch) -> list[list[float]]:
     arm = request.arm
     copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
-    same = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD
-    return [list(row) for row in units.joints_out(arm, copies[same]).tolist()]
+    keeps_held = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD
+    return [list(row) for row in units.joints_out(arm, copies[keeps_held]).tolist()]
 
 
 def refusal_error(request: Request, answer: Answer, distance: float) -> NoSolutionError:
-    """Why an answer has no best branch; distance: how far away the nearest pose within limits is [mm]."""
+    """The error of an answer without a best branch; distance: [mm] of the nearest pose within limits."""
     arm = request.arm
-    away = f"the nearest pose within limits is {distance:.4f} mm away"
+    nearest_text = f"the nearest pose within limits is {distance:.4f} mm away"
     legal = answer.within_limits
     fields: dict[str, Any] = {"robot": arm.name, "status": answer.status}
     fields |= {"distance_mm": distance, "branches_within_limits": legal}
     if answer.status == "unreachable":
-        return NoSolutionError(f"{arm.name} cannot reach this target; {away}", **fields)
+        return NoSolutionError(f"{arm.name} cannot reach this target; {nearest_text}", **fields)
     if answer.refused is not None:
-        return NoBranchError(answer.refused if legal else f"{answer.refused}; {away}", **fields)
+        return NoBranchError(answer.refused if legal else f"{answer.refused}; {nearest_text}", **fields)
     if legal:
         return blocked_error(request, answer)
-    return NoBranchError(f"no branch is within limits; {away}", **fields)
+    return NoBranchError(f"no branch is within limits; {nearest_text}", **fields)
 
 
 def blocked_error(request: Request, answer: Answer) -> NoBranchError:
-    """That every branch within limits hits something, and what."""
+    """The error of a target whose branches within limits all hit something."""
     words = {f"{b.name or 'it'} {hits_text(list(b.hits))}": b.hits for b in answer.branches if b.within_limits}
     return NoBranchError(
         f"every branch within limits hits something: {'; '.join(words)}",
@@ -234,15 +234,15 @@ def blocked_error(request: Request, answer: Answer) -> NoBranchError:
 
 
 def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
-    """Index of the first branch within limits and free, of those that are wanted (their flags); where hits are ignored
-    and none is free, with hits."""
-    free = (i for i, (branch, named) in enumerate(branches) if named and branch.may_be_taken)
-    hit = (i for i, (branch, named) in enumerate(branches) if named and branch.within_limits and request.ignore)
+    """Index of the first wanted branch (by its flag) within limits and free of hits; if hits are ignored, also one with
+    hits."""
+    free = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.may_be_taken)
+    hit = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.within_limits and request.ignore)
     return next(free, next(hit, None))
 
 
 def _held_values(arm: Arm, held: Mapping[str, float]) -> dict[str, float]:
-    """Joint name -> value, from [deg | mm] to [rad | mm]."""
+    """{joint: value}, converted from [deg | mm] to [rad | mm]."""
     values = units.joints_in(arm, [held.get(name, 0.0) for name in arm.joint_names]).tolist()
     return {name: value for name, value in zip(arm.joint_names, values, strict=True) if name in held}
 
@@ -252,21 +252,21 @@ def _kept_joints(arm: Arm, held: Mapping[str, float]) -> list[int]:
 
 
 def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, near: Array) -> Iterator[Answer]:
-    """The answers of one solver call, for the whole arm."""
+    """The answers of one call of the solver, in joints of the whole arm."""
     arm = request.arm
     q = unlock(arm, held, s.q) if held else s.q
-    outside = limits.outside_limits(arm, q)  # nan is not outside anything
+    outside = limits.outside_limits(arm, q)  # nan compares as inside
     within = s.within_limits & ~outside.any(axis=-1)
     mm, rad = s.residual()
     motions = units.joints_out(arm, np.abs(q - near)).sum(axis=-1)
     columns = units.joints_out(arm, q), s.branch, within, mm, units.angles_out(rad), motions
-    # From here on plain Python: numpy is slow at single numbers, and a batch has many.
+    # Plain Python from here on, as numpy is slow at single numbers and a batch has many.
     joints, names, legal, miss, turn, motion = (column.tolist() for column in columns)
     unheld = [name for name in arm.joint_names if name not in held]
     families = intervals_out(s)
     near_by = iter(hits(arm, q[s.valid])) if arm.keep_out else itertools.repeat((None, ()))
     flags = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
-    for i, (valid, status, sure) in enumerate(flags):
+    for i, (valid, status, proved) in enumerate(flags):
         branches = [
             Branch(
                 q[i, b],
@@ -286,23 +286,23 @@ def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, nea
         free = [name for name, is_free in zip(unheld, s.free[i].tolist(), strict=True) if is_free]
         legal_count = sum(branch.within_limits for branch in branches)
         name = Status(status).name.lower()
-        yield Answer(name, s.method, s.why, sure, free, branches, None, None, len(branches), legal_count, s.names)
+        yield Answer(name, s.method, s.why, proved, free, branches, None, None, len(branches), legal_count, s.names)
 
 
 @dataclass
 class _SweptTarget:
-    """What the swept values of one target have come to so far."""
+    """The answer of one target, collected over all swept values."""
 
     best: tuple[int, Answer] | None = None  # the best status, and the first answer with it
-    names: dict[str, None] = field(default_factory=dict)  # names in the order of coming
-    last: tuple[str, ...] = ()  # names in the answer before
+    names: dict[str, None] = field(default_factory=dict)  # names in the order of occurrence
+    last: tuple[str, ...] = ()  # names in the last answer
     free: set[str] = field(default_factory=set)
     total: int = 0
     legal: int = 0
-    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # branch, and whether it has the name asked for
+    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # branch, and whether it has the requested name
 
     def add(self, status: int, answer: Answer, wanted_names: set[str]) -> None:
-        """Take the answer for one combination of values in."""
+        """Add the answer for one combination of values."""
         rank = _RANKS.index(status)
         if self.best is None or rank < self.best[0]:
             self.best = rank, answer._replace(branches=[])
@@ -315,15 +315,15 @@ class _SweptTarget:
         self.branches += [(branch, branch.name in wanted_names) for branch in answer.branches]
 
     def thin_out(self, request: Request) -> None:
-        """Keep the nearest branch of every name, within limits and beyond, and drop the others."""
+        """Keep only the nearest branch of every name, inside and outside limits."""
         nearest: dict[tuple[str, bool, bool], tuple[Branch, bool]] = {}
         for item in sorted(self.branches, key=lambda item: _rank(request, item[0])):
             nearest.setdefault((item[0].name, item[0].within_limits, item[0].may_be_taken), item)
-        # A branch's q is a row of the array of all targets, which shall go.
+        # Copy q, which is a row of the large array of all targets.
         self.branches = [(branch._replace(q=branch.q.copy()), named) for branch, named in nearest.values()]
 
     def answer(self, request: Request) -> Answer:
-        """One answer of all: the best status, the branches sorted."""
+        """The combined answer, with the best status and the sorted branches."""
         assert self.best is not None
         first = self.best[1]
         ranked = sorted(self.branches, key=lambda item: _rank(request, item[0]))
@@ -350,16 +350,16 @@ class _SweptTarget:
 
 
 def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
-    hit = branch.within_limits and bool(branch.hits)  # outside limits hits do not count
-    turned = round(branch.residual_deg, tol.EQUAL) if request.position_first else 0.0
-    return not branch.within_limits, hit, turned, round(branch.motion, tol.EQUAL)
+    hit = branch.within_limits and bool(branch.hits)  # hits outside limits do not count
+    angle = round(branch.residual_deg, tol.EQUAL) if request.position_first else 0.0
+    return not branch.within_limits, hit, angle, round(branch.motion, tol.EQUAL)
 
 
 def _refusal_reasons(request: Request, named: Sequence[Branch]) -> str:
-    """What keeps the branches of the name asked for from being taken: they are outside limits, or hit something."""
+    """The reasons why the branches of the requested name are refused: limits or hits."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"
-    reasons: dict[str, str] = {}  # several poses may have one name, as with --sweep: the nearest counts
+    reasons: dict[str, str] = {}  # several poses may share a name, as with --sweep: the nearest counts
     for branch in named:
         if branch.within_limits and branch.hits:
             reasons.setdefault(branch.name, f"'{branch.name}' {hits_text(list(branch.hits))}")

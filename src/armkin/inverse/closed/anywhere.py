@@ -1,20 +1,20 @@
 """Three neighbouring axes that are parallel or meet in a point, anywhere among six revolute joints.
 
-The joints of the three axes keep a direction and the height along it, or a point. The other three joints are
-neighbours, too, if the pose is walked through as one more link of the loop (Pieper, The Kinematics of Manipulators
-under Computer Control, 1968). With these called a, b and c,
+The joints of the three axes do not change a direction and the height along it, or a point. The other three joints are
+neighbours, too, if the pose counts as one more link of a closed loop (Pieper, The Kinematics of Manipulators under
+Computer Control, 1968). With these joints called a, b and c,
 
     (1)  Za La Zb Lb Zc d = e
 
-for the direction and the height along it, or for the point. Undo joint a of e and do joint c to d:
-``f = Za^-1 e`` and ``g = Zc d``. Joint b keeps the height along its axis of what it turns, and
+holds for the direction and the height along it, or for the point. Let ``f = Za^-1 e`` and ``g = Zc d``. Joint b does
+not change heights along its own axis, so
 
     (2)  (Ra z) . f - (Rb^T z) . g = known,    ta . f + (Rb^T tb) . g = known
 
-hold for both: the second is the height along the direction, or the distance of the point. Where the pose is not La,
-the factors of f are the arm's own: if they are independent, f follows from g, and its known length makes a quartic
-for joint c; if not, a combination of the two equations holds g alone. Joint b follows from (1), and what is left of
-the loop is a planar arm of three joints, or a wrist: 8 branches.
+hold in both cases: the second is the height along the direction, or the distance of the point. Where the pose is not
+La, the factors of f depend on the arm alone. If they are independent, f follows from g, and its known length makes a
+quartic for joint c; if not, a combination of the two equations has only g. Joint b follows from (1), and the rest of
+the loop is a planar arm of three joints or a wrist: 8 branches.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
         loop = _Loop.of(reverse_chain(chain) if backward else chain, first, tolerance, arm.reach)
         if loop is not None and not loop.ends.close:
             geometry = _class_of(loop, range(5, -1, -1) if backward else range(6))
-            if backward:  # from the tool to the base
+            if backward:  # the chain was reversed
                 geometry = replace(geometry, pairs=sub.walked_back(loop.solve))
             if is_sound(arm, task, geometry):
                 return geometry
@@ -59,15 +59,15 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
 
 
 def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
-    """The class of a loop, of a chain whose joints have these names (0..5)."""
+    """The class of a loop, whose chain has joints with these numbers (0..5)."""
     axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
     relation, name = "meet in a point", "three axes that meet"
     if loop.three_link:
         relation, name = "are parallel", "three parallel axes"
     c = names[loop.joints[2]] + 1
-    how = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
-    why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {relation}; {how}"
-    # a free joint may leave the others a solution at a few of its values alone, where other self-motions cross
+    source = f"a quartic gives joint {c}" if loop.ends.regular else f"special axes give joint {c} by itself"
+    why = f"axes {axes[0]}, {axes[1]} and {axes[2]} {relation}; {source}"
+    # a free joint may have only a few values with solutions, where other self-motions cross
     ends = tuple(names[j] for j in loop.joints)
     return Geometry(name, why, True, loop.solve, ordered=not loop.ends.regular, ends=ends)
 
@@ -83,12 +83,12 @@ class _EndJoints:
         U, S, _ = np.linalg.svd(self.A)
         ratio = float(S[1] / max(S[0], tol.NO_SIZE))
         self.regular, self.close = ratio > tolerance, tolerance < ratio <= tol.NEAR_DEFECT
-        self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2): without f, and the other one
+        self.alone, self.main = U[:, 1], U[:, 0]  # combinations of (2) without f, and with f
 
     def solve(
         self, Lb: Pose, d: list[Entry], e: list[Entry], height: Entry, prefer: Prefer
     ) -> tuple[list[Pair], Doubt]:
-        """The three joints on branch axes (b0, b1, 1, N), and doubt; height: what is known in (2) for directions."""
+        """The three joints on branch axes (b0, b1, 1, N), and doubt; height: the known side of (2) for directions."""
         ta, tb = self.La[9:12], Lb[9:12]
         factors = [[arrays.mul(-1.0, v) for v in (Lb[2], Lb[5], Lb[8])], pose.turn_back(Lb, tb)]  # factors of g
         right: list[Entry] = [0.0, height]
@@ -137,7 +137,7 @@ class _EndJoints:
 
 
 class _Loop:
-    """The loop of a chain and its pose, from the first of the three axes on."""
+    """The closed loop of a chain and its pose, beginning at the first of the three axes."""
 
     def __init__(self, chain: Chain, first: int, reach: float, points: tuple[Array, Array] | None, tolerance: float):
         """first: the joint (0..5) of the first axis, 1 or 3; points: where they meet, seen before the first and after
@@ -162,7 +162,7 @@ class _Loop:
         if is_parallel(L1, tolerance) and is_parallel(L2, tolerance):
             return cls(chain, first, reach, None, tolerance)
         met = meeting_point(L1, L2, tolerance * reach)
-        if met is None or first != 1:  # at an end they are a spherical wrist or shoulder
+        if met is None or first != 1:  # at an end of the arm they are a spherical wrist or shoulder
             return None
         return cls(chain, first, reach, (met[0] / reach, met[1] / reach), tolerance)
 

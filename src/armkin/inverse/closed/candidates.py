@@ -21,17 +21,17 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.task import Task, shifted_targets
 from armkin.model.arm import Arm
 
-FEW_TARGETS = 8  # targets up to which plain Python is faster than arrays
-FREED = 24  # values tried for a joint that a target leaves free
-REFINEMENTS = 7  # refinements of the best of these values, each sixteen times closer: to 1e-9 rad
-# Steps from `near` [rad] all round, none of them to a round value: there a wrist may be straight, whose joints are free
-# as well and would jump to what is preferred.
+FEW_TARGETS = 8  # up to so many targets plain Python is faster than arrays
+FREED = 24  # values tried for a free joint
+REFINEMENTS = 7  # refinements of the best of these values by a factor of sixteen, to 1e-9 rad
+# Offsets from `near` [rad] over a whole turn. None is a round value, at which a wrist may be straight: its joints would
+# be free as well and jump to their preferred values.
 ROUND = np.asarray((np.arange(FREED)[:, None] + 0.37) * (2.0 * np.pi / FREED) - np.pi, np.float64)
-SHAKEN = 8  # moves tried of a target to where nothing is free
+SHAKEN = 8  # shifted targets, at which nothing is free
 
 
 class Recorded:
-    """A geometry's formula and the residual of what it finds."""
+    """A geometry's formula and the residuals of its candidates, as recorded code."""
 
     def __init__(self, arm: Arm, task: Task, geometry: Geometry) -> None:
         self.arm, self.task, self.geometry = arm, task, geometry
@@ -49,7 +49,7 @@ class Recorded:
         return np.broadcast_shapes((1, 1, 1), *self.code.axes()[:-3])
 
     def candidates(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
-        """Joint values of all candidates, their squared residual, edge and free of `Doubt`: n + 3 arrays."""
+        """Joint values of all candidates, their squared residual, and `edge` and `free` of `Doubt`: n + 3 arrays."""
         assert self.geometry.pairs is not None
         return self._of(self.geometry.pairs(goal, prefer), goal)
 
@@ -65,13 +65,13 @@ class Recorded:
         return [*values, miss, candidates.doubt.edge, candidates.doubt.free]
 
     def measured(self, goal: list[Entry], prefer: Prefer) -> list[Entry]:
-        """What `candidates` returns, and behind the residual those of lengths [reaches] and of small angles [rad]."""
+        """The arrays of `candidates`; behind the residual, those of lengths [reaches] and small angles [rad]."""
         assert self.geometry.pairs is not None
         candidates = self.geometry.pairs(goal, prefer)
         *values, miss, edge, free = self._of(candidates, goal)
         length, *turns = _squared_misses(self.arm, self.task, self.link, candidates.pairs, goal, every=True)
         angle: Entry = 0.0
-        for turn in turns:  # three axes are a turn's square off twice over
+        for turn in turns:  # the three axes count the square of a rotation twice
             angle = arrays.add(angle, arrays.mul(1.0 / max(len(turns) - 1, 1), turn))
         if len(self.task.sums):
             angle = arrays.add(angle, _sum_miss(self.task, values, goal))
@@ -79,7 +79,7 @@ class Recorded:
 
     @cached_property
     def _preferring(self) -> StraightLineCode:
-        """The candidates for given values of free joints: of the target's entries and these values' pairs."""
+        """The code for given values of free joints; inputs: the target's entries and the pairs of these values."""
         inputs = 12 if self.task.orientation == "full" else len(self.task.labels)
         slides = self.arm.prismatic.tolist()
 
@@ -91,8 +91,7 @@ class Recorded:
         return StraightLineCode(formula, inputs + 2 * len(slides) - sum(slides))
 
     def with_values(self, target: Array, values: Array) -> Array:
-        """Candidates of targets N for values (N, n) of the joints that are free, (N, B, n + 1): the last their squared
-        residuals."""
+        """Candidates (N, B, n + 1) of N targets for values (N, n) of the free joints; squared residuals come last."""
         flat = target_entries(self.task, target)
         for v, slides in zip(np.ascontiguousarray(values.T), self.arm.prismatic, strict=True):
             flat += [v] if slides else [np.cos(v), np.sin(v)]
@@ -100,7 +99,7 @@ class Recorded:
         return as_rows(columns[: self.arm.n + 1], len(target))
 
     def in_numbers(self, target: Array) -> list[Array]:
-        """`candidates` to the last digit the same, whatever a target is asked together with."""
+        """`candidates` in numbers that do not depend on the other targets, to the last digit."""
         if len(target) > FEW_TARGETS:
             return self.code.run_exactly(target_entries(self.task, target))
         full = self.task.orientation == "full"
@@ -114,27 +113,28 @@ class Recorded:
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
     def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
-        """More candidates of targets that leave joints free or seem to have no branch: (N, M, n), and branches (M,).
+        """Further candidates of targets with free joints or without a branch: (N, M, n), and branches (M,).
 
-        Where branches seem lost (N,): with other values for the joints that are free, and for targets moved a little,
-        which do not. Everywhere: of places where a self-motion meets another one. nan where there is none, or where the
-        candidate is far from its target. near: (N, n). Also of which targets (N,) these may not lead to all.
+        For targets with lost branches (N,), the candidates have other values of free joints, or belong to slightly
+        shifted targets without free joints. For all targets they include the places where two self-motions meet. nan
+        for none, or far from the target. near: (N, n). Also which targets (N,) may still lack branches.
         """
         q, miss = self._at_shifts(target, near, ROUND)
-        if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # nothing that a formula leaves free: no curve, no meeting
+        if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # no free joint, so no self-motion
             return q[:, 0, :0], np.zeros(0, np.int64), np.zeros_like(lost)
         exact = np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
         chosen, held = four_bars.one_per_circuit(self.arm, exact, near)
         of_linkage: Bool = np.asarray(~np.isnan(held).all(axis=2) & (self.task.orientation == "full"))  # (N, B)
         linkage = np.asarray(of_linkage.any(axis=1))
-        # candidates that do not depend on the free joint are known already
+        # others do not depend on the free joint and are known already
         chosen = np.where(linkage[:, None, None], chosen & of_linkage[:, None], miss < tol.HOPELESS**2)
         more = [_each_once(np.where((chosen & lost[:, None, None])[..., None], q, np.nan))]
         solving = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
         meeting = crossings.postures_beside(self.arm, self.task, solving, target)
         apart = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
         same = np.where(np.isnan(apart), 0.0, apart).max(axis=3) < tol.TURNED
-        meeting[np.any(same & of_linkage[:, None], axis=2)] = np.nan  # on a self-motion of which all circuits are known
+        # these lie on a self-motion whose circuits are all known
+        meeting[np.any(same & of_linkage[:, None], axis=2)] = np.nan
         more.append(meeting)
         rows = np.flatnonzero(lost & ~linkage)
         if len(rows):
@@ -145,37 +145,37 @@ class Recorded:
         return np.concatenate(more, axis=1), branch, lost if self.geometry.ends else np.zeros_like(lost)
 
     def samples(self, target: Array, near: Array) -> Array:
-        """Candidates (N, FREED, B, n) with values for free joints all round; nan where they miss their target."""
+        """Candidates (N, FREED, B, n) with values of free joints over a whole turn; nan where one misses."""
         q, miss = self._at_shifts(target, near, ROUND)
         return np.where((miss <= tol.ACCEPTED**2)[..., None], q, np.nan)
 
     def best_shift(self, target: Array, near: Array, loose: Bool) -> tuple[Array, Bool]:
-        """How far from `near` the free joints of targets are best: (N, 1), [rad, parts of the reach].
+        """The offset from `near` of free joints at which targets are solved best: (N, 1), [rad, parts of the reach].
 
-        Where none of the values all round solves the target by a loose candidate (N, B), they are sought closer and
-        closer about the best one; also of which targets (N,) that is so.
+        If no value over a whole turn solves a target by a loose candidate (N, B), the search is refined around the best
+        value; also returns which targets (N,) needed that.
         """
-        shift, apart = ROUND, 2.0 * np.pi / FREED
-        best, open_, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
-        for closer in range(REFINEMENTS):
-            single[open_] = closer > 0
-            _, miss = self._at_shifts(target[open_], near[open_], best[open_, None] + shift)
-            size = np.where(loose[open_, None], miss, np.inf).min(axis=2)
-            best[open_] += shift[size.argmin(axis=1)]
-            open_ = open_[~(size.min(axis=1) <= (tol.ROUNDING if closer else tol.ACCEPTED) ** 2)]
-            if not len(open_):
+        shift, spacing = ROUND, 2.0 * np.pi / FREED
+        best, pending, single = np.zeros((len(target), 1)), np.arange(len(target)), np.zeros(len(target), bool)
+        for refinement in range(REFINEMENTS):
+            single[pending] = refinement > 0
+            _, miss = self._at_shifts(target[pending], near[pending], best[pending, None] + shift)
+            size = np.where(loose[pending, None], miss, np.inf).min(axis=2)
+            best[pending] += shift[size.argmin(axis=1)]
+            pending = pending[~(size.min(axis=1) <= (tol.ROUNDING if refinement else tol.ACCEPTED) ** 2)]
+            if not len(pending):
                 break
-            apart /= 16
-            shift = apart * np.arange(-16.0, 17.0)[:, None]
+            spacing /= 16
+            shift = spacing * np.arange(-16.0, 17.0)[:, None]
         return best, single
 
     def _at_shifts(self, target: Array, near: Array, shift: Array) -> tuple[Array, Array]:
-        """Candidates (N, S, B, n) with free joints so far from `near`, (S, 1) or (N, S, 1); squared residuals."""
+        """Candidates (N, S, B, n) with free joints shifted from `near`, (S, 1) or (N, S, 1); squared residuals."""
         values = near[:, None] + shift * np.where(self.arm.prismatic, self.arm.reach / np.pi, 1.0)
         return self._at_values(np.repeat(target[:, None], values.shape[1], axis=1), values)
 
     def _at_random_values(self, target: Array, near: Array) -> Array:
-        """Candidates (N, M, n) with random values for joints that are free, and of targets moved to where none is."""
+        """Candidates (N, M, n) with random values of free joints, and of shifted targets without free joints."""
         rng, n = np.random.default_rng(4), self.arm.n
         unit = np.where(self.arm.prismatic, self.arm.reach, np.pi)
         offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
@@ -194,15 +194,14 @@ class Recorded:
 
 
 def _each_once(q: Array) -> Array:
-    """Candidates (N, S, B, n) as (N, S B, n), those that repeat their branch's first one nan: where no joint is free,
-    other values for it change nothing."""
+    """Candidates (N, S, B, n) as (N, S B, n); nan where a branch repeats its first one, as no joint is free."""
     q = q.copy()
     q[:, 1:][(q[:, 1:] == q[:, :1]).all(axis=3)] = np.nan
     return q.reshape(len(q), -1, q.shape[3])
 
 
 def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
-    """Whether a closed form gives random postures back without a correction: its quartic may be ill-conditioned."""
+    """Whether a closed form reproduces random postures without a correction; its quartic may be ill-conditioned."""
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
     _, miss, _ = recorded_formula(arm, task, geometry).rows(fk(arm, q))
     return int((miss.min(axis=1) <= tol.ACCEPTED**2).sum()) >= 15
@@ -219,7 +218,7 @@ def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
 
 @lru_cache(maxsize=256)
 def recorded_formula(arm: Arm, task: Task, geometry: Geometry) -> Recorded:
-    """The recorded formula, one and the same for all calls of a solver."""
+    """The recorded formula, shared by all calls of a solver."""
     return Recorded(arm, task, geometry)
 
 

@@ -1,8 +1,8 @@
-"""Crossings: places of a self-motion at which another one leaves it.
+"""Crossings: places of a self-motion at which another one branches off.
 
-There the second smallest singular value vanishes. In between the steps of a walk along the self-motion it is seen to
-fall and rise, or, of square Jacobians, the product of all but the smallest one to change its sign: the determinant of
-the Jacobian bordered by its null vectors (Keller, Numerical solution of bifurcation problems, 1977).
+The second smallest singular value vanishes there. It shows between the steps along the self-motion as a minimum of that
+value. For square Jacobians the product of all singular values but the smallest changes its sign, which is the
+determinant of the Jacobian bordered by its null vectors (Keller, Numerical solution of bifurcation problems, 1977).
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
 
-MEETING = 0.1  # second smallest singular value, at the steps, from which on no two self-motions meet near
-MAX_PLACES = 12  # places looked at, at most, for each target
-OTHER_SIDE = 0.4  # distance [rad, reaches] from a crossing at which the other self-motion is looked for
-SAME_PLACE = 0.13  # distance [rad, reaches] of places that are one: half a step of a joint that turns
-STEP = 1.0  # movement [rad, reaches] of joints from one step to the next, above which they are not on one curve
+MEETING = 0.1  # steps with a larger second smallest singular value are far from crossings
+MAX_PLACES = 12  # most places examined for each target
+OTHER_SIDE = 0.4  # distance [rad, reaches] from a crossing to a posture on the other self-motion
+SAME_PLACE = 0.13  # closer places [rad, reaches] are the same: half a step of a revolute joint
+STEP = 1.0  # steps farther apart [rad, reaches] are on different curves
 
 
 def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
-    """Postures (N, M, n) beside the crossings of B self-motions, q (N, steps, B, n) all round; nan where there is none.
+    """Postures (N, M, n) near the crossings of B self-motions with steps q (N, steps, B, n) all round; nan for none.
 
-    A step off, in the plane of the two null directions, leads onto the other self-motion.
+    They are a step away in the plane of the two null directions, which leads onto the other self-motion.
     """
     N, steps, B, n = q.shape
     flat = q.reshape(-1, n)
@@ -46,8 +46,8 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         changes = ~np.isnan(share)
         place[changes] += share[changes][:, None] * way[changes] * unit
         meets |= changes
-        second[changes] *= tol.SIGN_FACTOR  # the crossing lies there, not at a step beside it
-    for b in range(1, B):  # double roots are there twice
+        second[changes] *= tol.SIGN_FACTOR  # prefer the crossing between two steps to the steps
+    for b in range(1, B):  # double roots occur twice
         twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
         meets[:, :, b] &= ~twin.any(axis=2)
     spot = _distinct_places(arm, place.reshape(N, -1, n), np.where(meets, second, np.inf).reshape(N, -1)).reshape(-1, n)

@@ -23,13 +23,13 @@ from armkin.model.rotation import FLIP, inverse
 class Elbow:
     """``link[0] Z1 link[1] Z2 link[2] Z3 tip``: joints 2 and 3 revolute and parallel.
 
-    All inside is seen from the frame of joint 2, in whose x-y plane the arm bends.
+    All quantities inside are in the frame of joint 2, in whose x-y plane the arm bends.
     """
 
     def __init__(self, chain: Chain, tip: Array) -> None:
         """chain: its first three joints are used; tip: (3,) the point after joint 3 to be placed [mm]."""
         L2 = chain.link[2]
-        self.parallel = is_parallel(L2, tol.ROUNDING)  # to rounding, so that `miss` and `turned_back` hold as they are
+        self.parallel = is_parallel(L2, tol.ROUNDING)  # to rounding, so that `miss` and `turned_back` are exact
         sense3 = 1.0 if L2[2, 2] > 0 else -1.0
         if sense3 < 0:
             L2, tip = L2 @ FLIP, FLIP[:3, :3] @ tip
@@ -47,10 +47,10 @@ class Elbow:
     ) -> tuple[list[Pair], Doubt]:
         """Angles of the three joints that bring the tip to p.
 
-        p: position in the base, entries (N,); past: an offset added to the tip in the frame
-        of joint 2 turned to its final direction (what lies past joint 3 and has a known
-        direction), else zeros; prefer: values given to joints that a target leaves free; tip: the point after
-        joint 3 where it depends on the target.
+        p: position in the base, entries (N,); past: the offset from the tip to the target in
+        the final direction of joint 2's frame (the part past joint 3 with a known direction),
+        else zeros; prefer: values for joints that a target leaves free; tip: the point after
+        joint 3 if it depends on the target.
         Returns three pairs on branch axes (shoulder, elbow, 1, N), and doubt.
         """
         x, y, z = pose.apply(self.from_base, p)
@@ -71,25 +71,25 @@ class Elbow:
         return [first, second, third], doubt1 | doubt23
 
     def _in_frame_of_joint2(self, first: Pair, p: list[Entry]) -> list[Entry]:
-        """A point p, seen from before joint 1, as joint 2's frame sees it."""
-        moved = [p[0], p[1], p[2] - first.c] if first.s is None else spin(first.c, -first.s, p)
-        lever = [arrays.sub(v, o) for v, o in zip(moved, self.shoulder[9:12], strict=True)]
+        """A point p from the frame before joint 1, in the frame of joint 2."""
+        turned = [p[0], p[1], p[2] - first.c] if first.s is None else spin(first.c, -first.s, p)
+        lever = [arrays.sub(v, o) for v, o in zip(turned, self.shoulder[9:12], strict=True)]
         return [arrays.dot(self.shoulder[k : k + 3], lever) for k in (0, 3, 6)]
 
     def miss(self, pairs: list[Pair], p: list[Entry]) -> Entry:
-        """Squared distance of the tip from p: joint 2's frame sees p pulled back and the tip pushed there."""
+        """Squared distance of the tip from p, both in the frame of joint 2."""
         first, second, third = pairs
         before = pose.apply(self.from_base, p)
         x, y, z = self._in_frame_of_joint2(first, before)
         total = (z - self.along) ** 2
         if first.s is not None:
-            # a pair off the unit circle scales p: its excess counts as a miss
+            # a pair off the unit circle scales p, so its excess counts as a miss
             stretched = first.c * first.c + first.s * first.s - 1.0
             total = total + stretched * stretched * (before[0] * before[0] + before[1] * before[1])
         return distance2(spin(*second, self.two_link.reach(third)), [x, y]) + total
 
     def turned_back(self, pairs: list[Pair], v: list[Entry]) -> list[Entry]:
-        """A direction in the base, seen from the frame after link 2 that joint 3 turns with."""
+        """A direction in the base, in the frame that joint 3 turns behind link 2."""
         first, second, third = pairs
         v = pose.turn_direction(self.from_base, v)
         v = pose.turn_back(self.shoulder, v if first.s is None else spin(first.c, -first.s, v))
@@ -110,17 +110,17 @@ class TwoLink:
         self, rx: Entry, ry: Entry, prefer2: Pair | None, prefer3: Pair | None, fore: list[Entry] | None = None,
         axis: int = 1,
     ) -> tuple[Pair, Pair, Doubt]:  # fmt: skip
-        """Both elbows, on that branch axis: pairs of joints 2 and 3, and doubt; fore: m, if the target changes it."""
+        """Both elbows on a branch axis: pairs of joints 2 and 3, and doubt; fore: m, if it depends on the target."""
         lx, ly, (mx, my) = self.lx, self.ly, (self.mx, self.my) if fore is None else fore[:2]
         upper2, fore2, across2 = lx * lx + ly * ly, mx * mx + my * my, rx * rx + ry * ry
         # |r|^2 = |l + Rz(q3) m|^2, halved: the product of both lengths and the cosine of the angle between them
-        ahead, beside, right = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
-        third, doubt3 = linear(ahead, beside, right, axis, self.scale**2, prefer3)
+        dot_lm, cross_lm, right = lx * mx + ly * my, ly * mx - lx * my, 0.5 * (across2 - (upper2 + fore2))
+        third, doubt3 = linear(dot_lm, cross_lm, right, axis, self.scale**2, prefer3)
         third = third if self.sense > 0 else Pair(third.c, -third.s)
         ux, uy, _ = self.reach(third, fore)
         # |l + Rz(q3) m| is the same for both elbows: once for both the pair below is normalised
-        aside = np.maximum(upper2 * fore2 - right * right, 0.0)
-        reached2 = ((upper2 + right) ** 2 + aside) / upper2 if upper2 > 0.0 else None
+        sine2 = np.maximum(upper2 * fore2 - right * right, 0.0)
+        reached2 = ((upper2 + right) ** 2 + sine2) / upper2 if upper2 > 0.0 else None
         length2 = None if reached2 is None else np.sqrt(reached2 * across2)
         second, doubt2 = rotation_between(ux, uy, rx, ry, self.scale, prefer2, length2)
         return second, third, doubt2 | doubt3
@@ -163,10 +163,10 @@ class ThreeLink:
         c, s = tx * x[0] + ty * x[1], tx * x[1] - ty * x[0]
         c23, s23 = added_angles(second, third, self.sense3)
         fourth = Pair(c * c23 + s * s23, arrays.mul(self.sense4, s * c23 - c * s23))
-        # joint 4's angle is what is left of the sum: one arctangent serves both elbows
+        # joint 4's angle is the rest of the sum, so one arctangent serves both elbows
         q2, q3 = (arrays.arctan2(pair.s, pair.c) for pair in (second, third))
-        left = arrays.wrap_angle(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
-        return [second, third, fourth], [q2, q3, arrays.mul(self.sense4, left)], doubt
+        rest = arrays.wrap_angle(arrays.sub(arrays.arctan2(s, c) - q2, arrays.mul(self.sense3, q3)))
+        return [second, third, fourth], [q2, q3, arrays.mul(self.sense4, rest)], doubt
 
     def miss(self, pairs: list[Pair], p: list[Entry]) -> tuple[Entry, Entry]:
         """Squared distance of joint 4's frame from p, in the plane and across it."""
@@ -183,7 +183,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     if not all(is_parallel(L, tolerance) for L in arm.link[2 : parallels + 1]):
         return None
     if arm.prismatic[0] and abs(arm.link[1][2, 2]) < tol.PARALLEL:
-        return None  # the slide lies in the arm's plane
+        return None  # the slide moves within the arm's plane
     why = "joints 2 and 3 are parallel" if parallels == 2 else "joints 2, 3 and 4 are parallel"
     labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")
     elbow = Elbow(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3])
@@ -201,9 +201,9 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
 
 
 def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
-    """Joint 4 takes what joints 2 and 3 leave of the pitch; joint 5, if there is one, is the roll."""
+    """Joint 4 is the rest of the pitch after joints 2 and 3; joint 5, if there is one, is the roll."""
     link = arm.link
-    # what stands past joint 4, in its frame: a point, moved about by the roll joint if there is one
+    # the tool point in the frame of joint 4, which a roll joint may move
     past = pose.constant(link[4])
     # Rz(q2) R2 Rz(q3) R3 Rz(q4) = Rz(q2 +- q3 +- q4) R2 R3, the signs those of antiparallel axes
     sense = [float(v) for v in task.sums[0][1:4] / task.sums[0][1]]
@@ -220,7 +220,7 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
             fifth, P = None, past
         offset = spin(c, s, pose.turn_direction(turned, P[9:12]))
         pairs, doubt = elbow.solve(goal[:3], offset, prefer)
-        # joint 4 takes what is left of the sum
+        # joint 4 is the rest of the sum
         c4, s4 = c, s
         for pair, g in zip(pairs[1:], sense[:2], strict=True):
             c4, s4 = c4 * pair.c + g * s4 * pair.s, s4 * pair.c - g * c4 * pair.s
@@ -231,7 +231,7 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
 
 
 def _roll(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
-    """Joint 4 is given by the target; it moves the tip that the three joints before it place."""
+    """Joint 4 follows from the target, and shifts the tip that the three joints before it place."""
     weight, after3, end = float(task.sums[0][3]), pose.constant(arm.link[3]), pose.constant(arm.link[4])
 
     def roll(goal: list[Entry], prefer: Prefer) -> Candidates:

@@ -1,8 +1,9 @@
-"""Four bars: which circuit of a planar or spherical four-bar linkage a posture is on, in closed form.
+"""Four-bar linkages: finds the circuit of a posture on a planar or spherical one, in closed form.
 
-Where four joints move and their axes are parallel, or meet in a point, while the tool keeps its pose, tool and base
-are one bar. Such a linkage has two circuits if there is a joint that it can neither stretch nor fold: the sine of the
-angle there keeps its sign on each (Grashof 1883; Chiang, Kinematics of Spherical Mechanisms, 1988). Else it has one.
+Four moving joints with parallel axes, or with axes that meet in a point, are a four-bar linkage while the tool keeps
+its pose, with tool and base as one bar. If the linkage can neither stretch nor fold at some joint, it has two
+circuits, and the sine of the angle there keeps its sign on each; else it has one circuit (Grashof 1883; Chiang,
+Kinematics of Spherical Mechanisms, 1988).
 """
 
 from __future__ import annotations
@@ -32,9 +33,9 @@ class _Linkages(NamedTuple):
 
 
 def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
-    """Whether the self-motions through q (M, n) are of four bars, and the joint whose sine tells two circuits apart.
+    """Whether the self-motions through q (M, n) are four-bar linkages, and the joint whose sine distinguishes circuits.
 
-    joints: (M, n) those that move. Returns (M,) and (M,), -1 where there is one circuit.
+    joints: (M, n) those that move. Returns (M,) and (M,), the latter -1 for a single circuit.
     """
     is_linkage, joint = np.zeros(len(q), bool), np.full(len(q), -1)
     rows = np.flatnonzero((joints.sum(axis=1) == 4) & ~(joints & arm.prismatic).any(axis=1))
@@ -43,12 +44,12 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
     four = np.nonzero(joints[rows])[1].reshape(-1, 4)
     linkage = _linkages(arm, q[rows], four)
     lowest, highest = _diagonals(linkage.bars, linkage.spherical)
-    # the diagonal beside a joint is that of the other two bars, too
+    # the diagonal opposite to a joint belongs to the other two bars, too
     least, most = np.roll(lowest, -2, axis=1), np.roll(highest, -2, axis=1)
-    # equal bars, or nearly: there are several postures in one line, and the curve may fall into others that cross
+    # with equal bars several postures are in one line, and the curve may split into crossing ones
     ends = np.abs(np.stack([lowest - least, lowest - most, highest - least, highest - most]))
     several = ((ends < tol.NEAR_DEFECT).sum(axis=0) > 1).any(axis=1)
-    # where all bars come so near to one line that the posture in it solves the target, two circuits are one
+    # two circuits are one if the posture with all bars in a line solves the target
     least, most = least - tol.SOLUTION, most + tol.SOLUTION
     reaches = ((lowest > least) & (lowest < most)) | ((highest > least) & (highest < most))
     length = np.where(linkage.spherical[:, None], np.sin(linkage.bars), linkage.bars)
@@ -59,18 +60,18 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
 
 
 def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
-    """On which of two circuits postures (M, n) of four bars are: whether the sine at a joint (M,) is positive: (M,)."""
+    """The circuit of postures (M, n) on linkages, as the sign of the sine at a joint (M,): True if positive, (M,)."""
     four = np.nonzero(joints)[1].reshape(-1, 4)
     sine = _linkages(arm, q, four).sine
     return np.asarray((np.where(four == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
 
 
 def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
-    """Which postures q (N, S, B, n), nan where there is none, stand for the circuits of four bars.
+    """Choose one posture of q (N, S, B, n), nan for none, for each circuit of a four-bar linkage.
 
-    near: (N, n). The S postures of a column are of one self-motion, moved by the joints that differ. Returns (N, S, B)
-    all but those of four bars that are not the nearest to `near` of their circuit, and (N, B, n) a posture of each
-    self-motion of four bars, nan in the joints that these move, and where there is none.
+    near: (N, n). The S postures of a column are on one self-motion of the joints that differ. Returns (N, S, B) which
+    postures are kept: all except those on linkages that are not the nearest to `near` on their circuit. Also (N, B, n)
+    a posture of each linkage, nan in its moving joints and where there is none.
     """
     N, _, B, n = q.shape
     present = ~np.isnan(q[..., 0])
@@ -96,11 +97,11 @@ def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
 
 
 def _diagonals(bars: Array, spherical: Bool) -> tuple[Array, Array]:
-    """The shortest and longest distance of the neighbours of each joint, of the bars on both sides of it: (M, 4)."""
-    before = np.roll(bars, 1, axis=1)
-    total = before + bars
+    """The shortest and longest diagonal over each joint, from the bars on both sides of it: (M, 4)."""
+    previous = np.roll(bars, 1, axis=1)
+    total = previous + bars
     arc = np.minimum(total, 2.0 * np.pi - total)
-    return np.abs(before - bars), np.where(spherical[:, None], arc, total)
+    return np.abs(previous - bars), np.where(spherical[:, None], arc, total)
 
 
 def _linkages(arm: Arm, q: Array, four: Int) -> _Linkages:
@@ -113,7 +114,7 @@ def _linkages(arm: Arm, q: Array, four: Int) -> _Linkages:
     planar = (area < tol.NO_AREA).all(axis=1)
     behind = np.roll(ahead, 1, axis=1)
     bars, sine = np.linalg.norm(ahead, axis=2), (cross_rows(behind, ahead) * axis[:, :1]).sum(axis=2)
-    # all meet in the point where the first two do
+    # the axes have to meet where the first two do
     far = np.maximum(area[:, :1] ** 2, tol.TINY)
     turn = cross_rows(ahead[:, 0], axis[:, 1])
     along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far

@@ -1,4 +1,4 @@
-"""What a class of arms provides to be solved."""
+"""The interface of a class of arms: its solver and properties."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ ClosedForm = Callable[[list[Entry], Prefer], Candidates]  # `Geometry.pairs`
 
 
 class Rows(NamedTuple):
-    """What a solver that works row by row returns for targets.
+    """The result of a solver that works row by row.
 
     q: (N, B, n) branches [rad | mm], nan past a target's last one.  doubt: (N,) targets to be examined by
-    `inverse.singular.components`.  complete: (N,) every isolated branch is there.  lost: (N,) singular postures may
-    be missing.  guesses: (N, G, n) postures that may be close to these.
+    `inverse.singular.components`.  complete: (N,) whether every isolated branch is there.  lost: (N,) whether singular
+    postures may be missing.  guesses: (N, G, n) postures that may be close to those.
     """
 
     q: Array
@@ -43,11 +43,11 @@ class Geometry:
     complete: bool
     pairs: ClosedForm | None = None
     rows: Callable[[Array], Rows] | None = None
-    unmoved: Callable[[Array], Rows] | None = None  # `rows` for targets that are examined where they are in doubt
-    labels: tuple[str, ...] = ()  # what the branch axes mean: ("shoulder", "elbow", "wrist")
-    ordered: bool = True  # a branch keeps its index along a path; else `branches.tracking` sees to it
-    elimination: Any = None  # prepared elimination that `rows` come from, if they do
-    ends: tuple[int, ...] = ()  # joints of `pairs` that, where they are free, may leave others few solutions or more
-    doubts: Geometry | None = None  # slower way than `pairs` for the targets that are in doubt
+    unmoved: Callable[[Array], Rows] | None = None  # `rows` for targets whose doubts are examined later
+    labels: tuple[str, ...] = ()  # names of the branch axes: ("shoulder", "elbow", "wrist")
+    ordered: bool = True  # whether a branch keeps its index along a path; else `branches.tracking` is used
+    elimination: Any = None  # prepared elimination behind `rows`, if any
+    ends: tuple[int, ...] = ()  # joints that, if free, may have only a few values with solutions
+    doubts: Geometry | None = None  # slower solver for the targets that `pairs` doubts
     places: Callable[[Array, Array], Int] | None = None  # indices of an elimination's branches
-    branches: int | None = None  # columns of `rows` that the labels name; what follows is numbered
+    branches: int | None = None  # columns of `rows` with names; later ones are numbered

@@ -1,8 +1,8 @@
-"""Arms that miss a class by a little, in straight-line code: the class's roots as seeds, Newton steps on the arm.
+"""Arms close to a class, in straight-line code: the class's roots are seeds of Newton's method on the arm.
 
-Four roots are all that three turning joints have for a point, whatever their axes (Pieper, The Kinematics of
-Manipulators under Computer Control, 1968, gives the quartic): where four seeds lead to four roots, none is missing.
-What the seeds leave open is a doubt, for which other ways are taken.
+Three revolute joints have at most four roots for a point, whatever their axes (Pieper, The Kinematics of Manipulators
+under Computer Control, 1968, gives the quartic): if four seeds lead to four roots, none is missing. Other targets are
+in doubt and need a slower solver.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ from armkin.model.arm import Arm
 from armkin.model.rotation import joint_motion, rotation_about
 from armkin.model.units import radian_or_reach
 
-MAX_STEPS = 5  # Newton steps, at most, from a candidate
-SLOPE = 48.0  # error of the first step per distance from the class, where the arm is not near a singularity
-SENSES = {-1.0, 0.0, 1.0}  # factors of a joint in a sum: turned back, left out, turned forth
+MAX_STEPS = 5  # most Newton steps from a candidate
+SLOPE = 48.0  # error of the first step per distance from the class, away from singularities
+SENSES = {-1.0, 0.0, 1.0}  # factors of a joint in a sum
 ABSENT = 90.0  # squared residual of a root that is not real, in distances from the class: 9 on each side of it
 
 
@@ -39,42 +39,42 @@ class NewtonSteps:
         self.arm, self.size = arm, task.position  # equations and unknowns: 2 or 3
         link, offset = _links_without_turns(arm)
         self.base: pose.Pose | None = None
-        if self.size == 3:  # what the target misses is told in the first joint's frame
+        if self.size == 3:  # residuals are in the first joint's frame
             self.base, link[0] = pose.inverse(pose.constant(link[0])), np.eye(4)
         self.link = [pose.constant(L) for L in link]
         self.offset = [Pair(math.cos(v), math.sin(v)) for v in offset]
         self.unit = [float(v) for v in radian_or_reach(arm)]
         first_sums, last_sums = task.sums[:, : self.size], task.sums[:, self.size :]
         follow = -np.linalg.solve(last_sums, first_sums) if len(task.sums) else np.zeros((0, self.size))
-        self.follow: list[list[float]] = follow.tolist()  # how the last joints turn with the first ones
+        self.follow: list[list[float]] = follow.tolist()  # derivatives of the last joints by the first ones
         error = min(SLOPE * distance, 0.5)  # each step squares the error
         least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
         self.steps = min(least + 1, MAX_STEPS)  # one more, and two thirds of those near a singularity need no other way
         self.counted = task.name == "xyz" and not arm.prismatic.any()
-        # squared residual of a seed that leads nowhere, and need not; the error grows with a slide's extension
+        # seeds with a larger squared residual need not converge; a slide's error grows with its extension
         self.absent = None if self.counted or arm.prismatic.any() else ABSENT * distance
 
     def correct_seeds(self, seeds: Candidates, goal: list[Entry]) -> Candidates:
-        """Seeds moved onto the arm, and which of them are in doubt.
+        """Seeds corrected to roots of the arm, and which of them are in doubt.
 
-        Where the roots are counted, all four must be there, each apart from the others; else those that may be real.
+        If roots are counted, all four must exist and be distinct, else all that may be real.
         """
         point = goal[: self.size] if self.base is None else pose.apply(self.base, goal[:3])
         pairs, first = self._turn_links(seeds.pairs, 1.0), None
         for _ in range(self.steps):
-            missing, columns = self._linear(pairs, point)
+            residual, columns = self._linear(pairs, point)
             adjugate, det = _adjugate(columns)
             inverse = det / (det * det + tol.NO_DETERMINANT)
-            pairs = self._take_step(pairs, [arrays.mul(inverse, arrays.dot(row, missing)) for row in adjugate])
-            first = missing if first is None else first
+            pairs = self._take_step(pairs, [arrays.mul(inverse, arrays.dot(row, residual)) for row in adjugate])
+            first = residual if first is None else first
         assert first is not None
-        miss = arrays.dot(missing := self._linear(pairs, point)[0], missing)
+        miss = arrays.dot(residual := self._linear(pairs, point)[0], residual)
         solving = miss < precision().nearby
-        left: Truth = miss >= precision().nearby
+        unsolved: Truth = miss >= precision().nearby
         pairs = self._turn_links(pairs, -1.0)
         if self.absent is not None:
-            left = left & (arrays.dot(first, first) < self.absent)
-        return Candidates(pairs, seeds.doubt | (_merged_branches(pairs, self.unit) & solving) | left, miss)
+            unsolved = unsolved & (arrays.dot(first, first) < self.absent)
+        return Candidates(pairs, seeds.doubt | (_merged_branches(pairs, self.unit) & solving) | unsolved, miss)
 
     def _turn_links(self, pairs: list[Pair], sense: float) -> list[Pair]:
         """Joints as the links without their turns have them, or with sense -1 back."""
@@ -82,7 +82,7 @@ class NewtonSteps:
         return [pair if pair.s is None else added_angles(pair, offset, sense) for pair, offset in joints]
 
     def _linear(self, pairs: list[Pair], point: list[Entry]) -> tuple[list[Entry], list[list[Entry]]]:
-        """What the point still misses, and its change with each of the first joints [reaches a radian or reach].
+        """The residual of the point, and its derivatives by the first joints [reaches a radian or reach].
 
         All is carried from the tool back to the base; in joint i's own frame its slope is ``z x p``.
         """

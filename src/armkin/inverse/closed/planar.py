@@ -65,7 +65,7 @@ def _with_lift(
         pairs, doubt = solve_plane(goal, [prefer[i] for i in joints])
         if lift is None:
             return Candidates(pairs, doubt)
-        # the lift's value is what is missing in height when it is zero
+        # the lift is the missing height with the lift at zero
         P = fixed[0]
         motions = iter(pairs)
         for i in range(arm.n):
@@ -80,7 +80,7 @@ def _with_lift(
 
 
 def _leaves_plane(w: Array, prismatic: Bool, lift: int | None) -> float:
-    """How far axes w (n, 3) are from turning about z, sliding in the x-y plane, and lifting along z, at most."""
+    """The largest deviation of axes w (n, 3) from rotation about z, sliding in the x-y plane, and lifting along z."""
     upright, level = ~prismatic, prismatic.copy()
     if lift is not None:
         upright[lift], level[lift] = True, False
@@ -115,7 +115,7 @@ def _two_turning(chain: Chain) -> Solve:
     start = pose.constant(inverse(base))
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:
-        # height does not matter: any point above or below the target will do
+        # the height does not matter, so take 0
         p = pose.apply(start, [goal[0], goal[1], 0.0])
         first, second, doubt = two_link.solve(p[0], p[1], prefer[0], prefer[1])
         return [first, second], doubt
@@ -139,7 +139,7 @@ def _at_zero(chain: Chain) -> Array:
 
 
 def _last_of_sum(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair | None], joint: int) -> Pair:
-    """The joint that is left, from the sum of all."""
+    """The remaining joint, from the sum of all."""
     c, s = arrays.cos_sin(goal[-1] - task.offsets[0])
     for w, pair in zip(weights, pairs, strict=True):
         if pair is not None and pair.s is not None and w:
@@ -148,7 +148,7 @@ def _last_of_sum(goal: list[Entry], task: Task, weights: Array, pairs: list[Pair
 
 
 def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
-    """Joint 3 turns: step back from the tool to its axis, place that point with joints 1 and 2."""
+    """Joint 3 is revolute: place the point on its axis with joints 1 and 2."""
     back, R0 = pose.constant(inverse(chain.link[3])), _at_zero(chain)
     R0[:3, 3] = 0.0
     two = _two_joints(Chain(chain.link[:3], chain.prismatic[:2]))
@@ -164,7 +164,7 @@ def _known_last(chain: Chain, task: Task, weights: Array) -> Solve:
 
 
 def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
-    """Joint 3 slides, joint 1 turns: the same walked from the tool to the base."""
+    """Joint 3 is prismatic and joint 1 revolute: the same with the chain reversed."""
     level = np.eye(4)  # the tool's frame when all joints are zero, turned so that z is the plane's normal
     level[:3, :3] = _at_zero(chain)[:3, :3].T
     back = reverse_chain(Chain(np.array([*chain.link[:3], chain.link[3] @ level]), chain.prismatic))
@@ -181,7 +181,7 @@ def _known_first(chain: Chain, task: Task, weights: Array) -> Solve:
 
 
 def _known_middle(chain: Chain, task: Task, weights: Array) -> Solve:
-    """Joints 1 and 3 slide, joint 2 turns: its angle is given, two equations linear in the slides."""
+    """Joints 1 and 3 are prismatic: joint 2 is given, and two equations are linear in the slides."""
     link = [pose.constant(L) for L in chain.link]
 
     def solve(goal: list[Entry], prefer: Prefer) -> tuple[list[Pair], Doubt]:

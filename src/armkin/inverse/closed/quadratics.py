@@ -18,7 +18,7 @@ def of_form(form: Array) -> Array:
 
 
 def product(u: list[Entry], v: list[Entry]) -> list[Entry]:
-    """Product of two affine expressions; what follows their first three coefficients is not read."""
+    """Product of two affine expressions, of which only the first three coefficients are read."""
 
     def mixed(i: int, j: int) -> Entry:
         return arrays.add(arrays.mul(u[i], v[j]), arrays.mul(u[j], v[i]))
@@ -34,7 +34,7 @@ def product(u: list[Entry], v: list[Entry]) -> list[Entry]:
 
 
 def total(*terms: list[Entry]) -> list[Entry]:
-    """The sum of some."""
+    """The sum of expressions."""
     sums = terms[0]
     for term in terms[1:]:
         sums = [arrays.add(a, b) for a, b in zip(sums, term, strict=True)]
@@ -44,7 +44,7 @@ def total(*terms: list[Entry]) -> list[Entry]:
 def turn(six: list[Entry], size: Entry, prefer: Pair | None) -> tuple[Pair, Doubt]:
     """A joint from a quadratic equation of its cosine and sine, of the size of `size` squared: four roots.
 
-    Pairs of complex roots stay off the unit circle, no longer than 2: normalised they may be a real root once more.
+    Pairs of complex roots stay off the unit circle, with length up to 2, as they could equal a real root if normalised.
     """
     pair, doubt = trig_quadratic(six, size * size, prefer)
     shorter = 1.0 / arrays.maximum(1.0, 0.5 * arrays.sqrt(pair.c * pair.c + pair.s * pair.s))

@@ -1,8 +1,8 @@
 """Spherical wrists and shoulders: three joint axes that meet in one point at an end of the arm.
 
-The point does not feel the three joints: the other three place it (`Elbow` or `Position`),
-and the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose
-first three axes meet is the same arm walked from the tool to the base.
+The three joints do not move that point: the other three place it (`Elbow` or `Position`), and
+the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose first
+three axes meet is solved as the reversed chain.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ class SphericalWrist:
     def _carried_forward(
         self, pairs: list[Pair], centre: list[Entry], columns: list[list[Entry]]
     ) -> tuple[Entry, list[Entry], list[Entry]]:
-        """Squared distance of the wrist's centre from where it should be, and directions seen after joint 3."""
+        """Squared distance of the wrist's centre from its target, and directions in the frame after joint 3."""
         P = self.links[0]
         for i, pair in enumerate(pairs):
             P = pose.slide(P, pair.c) if pair.s is None else pose.rotate(P, *pair)

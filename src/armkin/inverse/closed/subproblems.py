@@ -1,12 +1,11 @@
-"""The subproblems that every closed form is made of.
+"""The subproblems of all closed forms.
 
-Angles are carried as cosine and sine pairs and become angles only at the very end: the
-pairs come out of the algebra without any inverse function, and the residual of a branch
-can be checked with them directly.
+Angles are pairs of cosine and sine until the end: the algebra gives the pairs without inverse
+functions, and they are enough to compute the residual of a branch.
 
-Branch axes: the solutions of a subproblem stand on axes of their own in front of the
-batch axis, as in shape (2, 2, 1, N), and broadcast against what does not depend on them.
-The caller says which axis by the shape of `signs`.
+The solutions of a subproblem are on branch axes of their own in front of the batch axis, as in
+shape (2, 2, 1, N), and broadcast against quantities that do not depend on them. The argument
+`axis` chooses the axis (`signs`).
 """
 
 from __future__ import annotations
@@ -27,8 +26,8 @@ from armkin.inverse.numeric import tolerances as tol
 class Precision(NamedTuple):
     """Thresholds of `tolerances`, relative to the equation's own size, for the numbers that a formula is recorded for.
 
-    An edge is what is one within the rounding of a pose: in float an arm's own pose with a straight wrist comes out of
-    the forward kinematics some units of the last place beside it.
+    A target counts as on an edge if it is so within the rounding of a pose: in float, the forward kinematics of a
+    straight wrist give a pose some units of the last place beside the singular one.
     """
 
     tangent: float
@@ -36,7 +35,7 @@ class Precision(NamedTuple):
     one_root: float
     free: float
     nearly_free: float
-    nearby: float  # squared residual up to which a branch may be one
+    nearby: float  # largest squared residual of a possible branch
 
 
 ULPS = 128 * 2.0**-23  # relative rounding of a float: a pose of six joints is off by ten to a hundred units
@@ -53,7 +52,7 @@ def precision() -> Precision:
 
 @contextmanager
 def recorded_for(numbers: Precision) -> Iterator[None]:
-    """Formulas inside are recorded for other numbers."""
+    """Record the formulas inside for other numbers."""
     token = _current.set(numbers)
     try:
         yield
@@ -65,10 +64,10 @@ class Pair(NamedTuple):
     """Cosine and sine of a joint's angle [rad], or the value [mm] of a prismatic joint and None."""
 
     c: Entry
-    s: Any  # an Entry, or None: who knows that a joint is revolute need not ask
+    s: Any  # an Entry, or None for a prismatic joint
 
 
-# What to give a joint that a target leaves free, or None.
+# The motion given to a joint that a target leaves free, or None.
 Prefer = Sequence[Pair | None]
 Conic = tuple[Entry, ...]  # a, b, u, v, w of the matrix [[a, b, u], [b, -a, v], [u, v, w]]; diag(1, 1, -1): circle
 
@@ -77,8 +76,8 @@ Conic = tuple[Entry, ...]  # a, b, u, v, w of the matrix [[a, b, u], [b, -a, v],
 class Doubt:
     """Which branches are on an edge.
 
-    edge: roots are about to merge, or a joint is free; free: of these, a joint is free, and what was found holds for
-    one of its values at most. Boolean entries, broadcastable to the branch axes.
+    edge: roots are about to merge, or a joint is free; free: a joint is free, so that the result holds for at most one
+    of its values. Boolean entries, broadcastable to the branch axes.
     """
 
     edge: Bool
@@ -94,12 +93,12 @@ class Doubt:
     __ror__ = __or__
 
     def where(self, real: Truth) -> Doubt:
-        """This doubt, none where a branch is not real: a joint that would be free there is none of a branch."""
+        """This doubt, cleared where a branch is not real, as a free joint does not matter there."""
         return Doubt(self.edge & real, self.free & real)
 
 
 class Candidates(NamedTuple):
-    """What a closed form returns: candidate branches, not yet told from false ones.
+    """The result of a closed form: candidate branches, some of which may be false.
 
     pairs: one a joint, on branch axes (b0, b1, b2, N). doubt: broadcastable to these. miss:
     squared residual of every branch (lengths in units of the reach), recomputed from the
@@ -119,12 +118,12 @@ class Candidates(NamedTuple):
         return [arrays.arctan2(s, c) if x is None else x for (c, s), x in zip(self.pairs, known, strict=True)]
 
     def reversed(self) -> Candidates:
-        """The candidates for the chain walked the other way."""
+        """The candidates for the reversed chain."""
         return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
 
 
 def walked_back(solve: Callable[[pose.Pose, Prefer], Candidates]) -> Callable[[pose.Pose, Prefer], Candidates]:
-    """The closed form of an arm from that of its chain walked from the tool to the base."""
+    """The closed form of an arm from that of its reversed chain."""
     return lambda goal, prefer: solve(pose.inverse(goal), prefer[::-1]).reversed()
 
 
@@ -177,7 +176,7 @@ def linear(
     root = arrays.sqrt(arrays.maximum(disc, 0.0)) * sign
     least = thresholds.free * scale * scale
     if isinstance(h2, float) and isinstance(least, float):
-        free: Truth = (c == c) if h2 < least else False  # the equation says nothing about it, whatever the target
+        free: Truth = (c == c) if h2 < least else False  # a constant equation: free for every target
         inverse: Entry = 1.0 / max(h2, least)
     else:
         free = h2 < least
@@ -207,8 +206,8 @@ def rotation_between(
 ) -> tuple[Pair, Doubt]:
     """The planar rotation that turns u's direction into v's (IK-Geo subproblem 1).
 
-    length2: the product of the lengths of u and v, where the caller knows it: of their squares where both are as long
-    if the target is reached; the pair of a target that is not is then not normalised.
+    length2: the product of the lengths of u and v, if the caller knows it, or their common square if the target is
+    reached; the pair of another target is then not normalised.
     Returns the pair and doubt: where u or v vanishes, so that the angle is free.
     """
     thresholds = precision()
@@ -256,7 +255,7 @@ def quadratic(
 
 
 def half_tangent(pair: Pair) -> Entry:
-    """``tan(q/2)``, 1e9 where it is infinite: inf would turn into nan on its way."""
+    """``tan(q/2)``, 1e9 where it is infinite, since inf would become nan later."""
     # s / (1 + c) = (1 - c) / s: the form without cancellation
     ahead = pair.c > 0.0
     below = arrays.where(ahead, 1.0 + pair.c, pair.s)
@@ -358,7 +357,7 @@ def _line_pair(conic: Conic) -> tuple[Entry, Bool]:
     p3 = p / 3.0
     disc = q * q + p3 * p3 * p3
     alone, most, least = _cubic_roots(p3, q, disc)
-    # at an end, where two roots are double, rounding must not choose the double one
+    # where two roots are double at an end, rounding must not choose the double one
     span = arrays.sqrt(h) + tol.NO_SIZE
     above = arrays.maximum(most + third - span, 0.0)
     below = arrays.maximum(-span - least - third, 0.0)
@@ -383,7 +382,7 @@ def _cubic_roots(p: Entry, q: Entry, disc: Entry) -> tuple[Entry, Entry, Entry]:
 
 
 def _longest_vector(sizes: Sequence[Entry], vectors: Sequence[Sequence[Entry]]) -> list[Entry]:
-    """That of three vectors whose size is the largest."""
+    """The one of three vectors with the largest size."""
     later = sizes[1] > sizes[0]
     size = arrays.maximum(sizes[0], sizes[1])
     last = sizes[2] > size

@@ -1,15 +1,15 @@
 """Three joints of any kind and arrangement that place a point: the quartic and its special cases.
 
-Undo joint 1: of ``x = link[1] Z2 y(q3)``, y the tip in the frame of joint 2, only what joint
-1 cannot change is known. For a revolute joint 1 that is its height on the axis and its
-distance, for a prismatic one its two components across the axis. Both are linear in
+With joint 1 undone, only what joint 1 cannot change is known of ``x = link[1] Z2 y(q3)``, y the
+tip in the frame of joint 2. For a revolute joint 1 these are the height on its axis and the
+distance, for a prismatic one the two components across its axis. Both are linear in
 ``g = Rz(q2) y`` (Pieper, The Kinematics of Manipulators under Computer Control, 1968).
 
 Revolute joint 2: two equations ``A (gx, gy) = r(q3)`` with a constant A.
   A regular: ``|A^-1 r|^2 = |y across joint 2|^2``, a quadratic form in (1, cos q3, sin q3) or,
   joint 3 prismatic, in (1, d3, d3^2): a quartic, up to four branches.
   A of rank one (neighbouring axes parallel, intersecting, or at right angles): a combination
-  of the equations holds q3 alone, two roots; the other gives q2, two roots each.
+  of the equations has only q3, with two roots; the other gives q2, two roots each.
 Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 """
 
@@ -67,7 +67,7 @@ class Position:
         self.why = self._split()
 
     def _equations(self, L1: Array) -> tuple[Array, Array, list[Array]]:
-        """What joint 1 cannot change, as ``rows[k] . g + form_k(b) = known_k - rest[k]``."""
+        """The two invariants of joint 1, as ``rows[k] . g + form_k(b) = known_k - rest[k]``."""
         R, t = L1[:3, :3], L1[:3, 3]
         none = np.zeros((3, 3))
         if self.prismatic[0]:
@@ -76,7 +76,7 @@ class Position:
         return np.array([R[2], R.T @ t]), np.array([t[2], t @ t / 2]), [none, self.square / 2]
 
     def _split(self) -> str:
-        """Find the combination of the two equations without q2, if there is one; say what was found."""
+        """Find the combination of the two equations without q2, if there is one; returns the reason in words."""
         weight = np.array([1.0, 1.0 if self.prismatic[0] else 1.0 / self.scale])
         scaled = self.A * weight[:, None]
         if self.prismatic[1]:
@@ -89,12 +89,12 @@ class Position:
         if S[0] < tol.NO_COEFFICIENT:
             raise UsageError("joints 1 and 2 turn about one line: three joints cannot place a point")
         self.regular = self._is_regular(float(S[1] / S[0]))
-        self.alone = U[:, 1] * weight  # combination that holds q3 alone
-        self.main = U[:, 0] * weight  # the one that gives q2
+        self.alone = U[:, 1] * weight  # combination that has only q3
+        self.main = U[:, 0] * weight  # combination that gives q2
         return "a quartic gives joint 3" if self.regular else "special axes give joint 3 by itself"
 
     def _is_regular(self, ratio: float) -> bool:
-        """Whether the general equations serve, ratio being how far the arm is from a special case."""
+        """Whether the general equations are used; ratio: the distance of the arm from a special case."""
         self.close = self.tolerance < ratio <= self.near
         return ratio > self.tolerance
 
@@ -164,7 +164,7 @@ class Position:
         return third, second, doubt | doubt2
 
     def _rank_one(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        """Joint 3 from the combination of the equations that holds q3 alone, joint 2 from the other; A of rank one."""
+        """Joint 3 from the combination of the equations with only q3, joint 2 from the other; A of rank one."""
         alone = self._affine(self.alone, sides)
         if self.prismatic[2]:
             d, doubt = sub.quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])
@@ -172,7 +172,7 @@ class Position:
         else:
             # the combination is affine in (cos, sin): cos^2 and cos sin have cancelled
             a, b, c = alone[1], alone[2], arrays.mul(-1.0, alone[0])
-            # rounding parts a double root by 1e-8; where the tip is then on axis 2, joint 2 must be seen to be free
+            # rounding splits a double root by 1e-8; if the tip is then on axis 2, joint 2 must count as free
             third, doubt = sub.linear(a, b, c, 0, size, prefer[2], sub.one_root(a, b, c))
             third = sub.on_unit_circle(third)
         y = self._tip(third)
@@ -182,7 +182,7 @@ class Position:
         a = arrays.add(arrays.mul(ax, y[0]), arrays.mul(ay, y[1]))
         b = arrays.sub(arrays.mul(ay, y[0]), arrays.mul(ax, y[1]))
         second, doubt2 = sub.linear(a, b, right, 1, size, prefer[1])
-        # without a real third joint, the nearest one may well bring the tip onto axis 2: nothing is free there
+        # without a real joint 3 the nearest one may put the tip on axis 2, where no joint is free
         return third, sub.on_unit_circle(second), doubt | doubt2.where(_is_root(alone, third, size))
 
     def _slide(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
@@ -205,7 +205,7 @@ class Position:
             half[0], curved = half[0] + curved, 0.0
         half, curved = [float(v) for v in half], float(curved)
         if not self.regular:
-            # the height does not feel d2: it gives joint 3, then the distance gives d2
+            # the height does not depend on d2 and gives joint 3, then the distance gives d2
             third, doubt = self._one_unknown(across[0], size, prefer)
             remainder = arrays.sub(_at_joint(across[1], third), _at_joint(half, third))
             if third.s is None:

@@ -1,10 +1,10 @@
 """Six revolute joints, axes 2, 3 and 4 parallel, axes 5 and 6 meeting: the UR arms and their kin.
 
-Joints 2, 3 and 4 keep the distance along their common direction n, and the angle between n
-and axis 6. The first gives joint 1, the second joint 5; joint 6 follows from n seen from
-the tool, and a planar arm of three joints with a known direction is left (Hawkins, Analytic
-Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, in coordinates of any
-convention). The chain walked from the tool to the base covers axes 3, 4 and 5.
+Joints 2, 3 and 4 do not change the distance along their common direction n, nor the angle
+between n and axis 6. The distance gives joint 1, the angle joint 5; joint 6 follows from n in
+the tool's frame, and the rest is a planar arm of three joints with a known direction (Hawkins,
+Analytic Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, here for any
+convention). The reversed chain covers axes 3, 4 and 5.
 """
 
 from __future__ import annotations
@@ -103,13 +103,13 @@ class ThreeParallel:
         x = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[0:3]))
         pairs, angles, doubt234 = self.three_link.solve(p, x, prefer[1:4])
         doubt = doubt1 | doubt5 | doubt6 | doubt234
-        # joint 4's frame from joints 2, 3 and 4 is the one from the other side: its origin, and the
-        # common direction; about that joint 4 takes whatever angle is left
+        # the residual compares joint 4's frame from both sides of the chain, its origin and the common
+        # direction; about that direction joint 4 takes the remaining angle
         across, height = self.three_link.miss(pairs, p)
         along = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
-        aside = height * scale + sub.distance2(along, [0.0, 0.0, self.three_link.sense4])
-        return Candidates([first, *pairs, fifth, sixth], doubt, across * scale + aside, [None, *angles, None, None])
+        height_miss = height * scale + sub.distance2(along, [0.0, 0.0, self.three_link.sense4])
+        return Candidates([first, *pairs, fifth, sixth], doubt, across * scale + height_miss, [None, *angles, None, None])
 
     def _shoulder_joint(self, D: Pose, prefer: Pair | None) -> tuple[Pair, Doubt]:
         """Joint 1: where axes 5 and 6 meet has a known height along n. D: joint 6's frame seen from joint 1."""
@@ -123,7 +123,7 @@ class ThreeParallel:
     def _wrist_joints(self, n: Sequence[Entry], prefer: Prefer) -> tuple[tuple[Pair, Doubt], tuple[Pair, Doubt]]:
         """Joint 5 from the angle between n, seen from joint 6, and axis 6; joint 6 from n itself: Rz(-q6) v = n."""
         disc = n[0] * n[0] + n[1] * n[1] if self.orthogonal else None
-        # an oblique wrist's two roots merge whole
+        # the two roots of an oblique wrist merge as a whole
         tangent = sub.precision().sharp if self.orthogonal else sub.precision().tangent
         fifth, doubt5 = sub.linear(self.cos5, self.sin5, n[2] - self.rest5, 2, 1.0, prefer[4], disc, tangent)
         (c5, s5), m = fifth, self.m

@@ -1,4 +1,4 @@
-"""Three axes that meet in a point: the joints that turn a tool (Siciliano et al., Robotics, 2.12.5)."""
+"""Wrists: three axes that meet in a point and turn the tool (Siciliano et al., Robotics, 2.12.5)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def perpendicular_foot(L: Array) -> Array:
 
 
 def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
-    """Where the axes on both sides of two links meet: seen before the first joint and after the last one, or None."""
+    """The point where the axes around two links meet, before the first joint and after the last one, or None."""
     if is_parallel(L4, tol.PARALLEL) or is_parallel(L5, tol.PARALLEL):
         return None
     at4 = perpendicular_foot(L4)
@@ -59,17 +59,17 @@ class Wrist:
     def solve(
         self, x: list[Entry], z: list[Entry], prefer: Prefer
     ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
-        """The joints that turn the first and the last column to x and z, both ways on branch axis 2; their angles where
-        no inverse function is needed; doubt; and the squared distance that they leave of these columns."""
+        """The joints that turn the first and last column to x and z, both solutions on branch axis 2; their angles
+        where no inverse function is needed; doubt; and the squared distance of these columns from x and z."""
         if self.mirrored:
             return self._solve_mirrored(x, z, prefer)
         disc = z[0] * z[0] + z[1] * z[1] if self.orthogonal else None
         thresholds = precision()
-        # an oblique wrist's two roots merge whole
+        # the two roots of an oblique wrist merge as a whole
         tangent = thresholds.sharp if self.orthogonal else thresholds.tangent
         fifth, doubt5 = linear(self.cos5, self.sin5, z[2] - self.rest5, 2, 1.0, prefer[1], disc, tangent)
-        fourth, sixth, doubt4, wrong = self._turn_about_middle(fifth, x, z, disc, prefer)
-        return [fourth, fifth, sixth], [], doubt5 | doubt4, wrong
+        fourth, sixth, doubt4, miss = self._turn_about_middle(fifth, x, z, disc, prefer)
+        return [fourth, fifth, sixth], [], doubt5 | doubt4, miss
 
     def _turn_about_middle(
         self, fifth: Pair, x: list[Entry], z: list[Entry], across: Entry | None, prefer: Prefer
@@ -82,19 +82,19 @@ class Wrist:
         u = pose.turn_direction(turn5, self.B[6:9])
         fourth, doubt4 = rotation_between(u[0], u[1], z[0], z[1], 1.0, prefer[0], across)
         c4, s4 = fourth
-        # what is left is Rz(q6): its first column, which lies in the plane across joint 6
+        # the rest is Rz(q6): its first column lies in the plane across joint 6
         back = pose.turn_back(turn5, [c4 * x[0] + s4 * x[1], c4 * x[1] - s4 * x[0], x[2]])
         c6, s6, out_of_plane = pose.turn_back(self.B, back)
-        wrong = distance2(spin(c4, s4, u), z) + out_of_plane * out_of_plane
-        return fourth, Pair(c6, s6), doubt4, wrong
+        miss = distance2(spin(c4, s4, u), z) + out_of_plane * out_of_plane
+        return fourth, Pair(c6, s6), doubt4, miss
 
     def _solve_mirrored(
         self, x: list[Entry], z: list[Entry], prefer: Prefer
     ) -> tuple[list[Pair], list[Entry | None], Doubt, Entry]:
-        """A wrist of right angles: its other half is q4 + pi, -q5, q6 + pi, number for number the same."""
+        """A wrist of right angles, whose second solution is exactly q4 + pi, -q5, q6 + pi."""
         disc = z[0] * z[0] + z[1] * z[1]
         fifth = Pair(arrays.mul(self.cos5, z[2]), arrays.mul(self.cos5, arrays.sqrt(disc)))
-        fourth, sixth, doubt4, wrong = self._turn_about_middle(fifth, x, z, disc, prefer)
+        fourth, sixth, doubt4, miss = self._turn_about_middle(fifth, x, z, disc, prefer)
         sign = signs(2)
         flipped = 0.5 - 0.5 * sign
         q4, q6 = (arrays.arctan2(s, c) for c, s in (fourth, sixth))
@@ -103,4 +103,4 @@ class Wrist:
             sign * arrays.arctan2(fifth.s, fifth.c),
             q6 - flipped * arrays.copysign(np.pi, q6),
         ]
-        return [fourth, fifth, sixth], angles, (disc < precision().sharp) | doubt4, wrong
+        return [fourth, fifth, sixth], angles, (disc < precision().sharp) | doubt4, miss

@@ -1,4 +1,4 @@
-"""Batches of closed forms: chunks of poses that stay in the cache, entry by entry."""
+"""Solves batches by closed forms, in chunks of poses that fit the cache."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
 from armkin.model.arm import Arm
 
-TURNED_AT_ONCE = 512  # poses whose columns become rows: both stay in a core's own cache
+TURNED_AT_ONCE = 512  # poses transposed at once, which fit a core's cache
 
 
 def solve(  # noqa: C901 - one pass over a batch's arrays
@@ -35,22 +35,22 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
 ) -> tuple[Batch, int, Array, Array, Int]:
     """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
 
-    near: (N, n), common: (n,) if it serves all; workers: threads. Also how many branch columns the class has, the
-    targets as they were solved, their `rounding`, and those on an edge, of a class that has another way for them.
+    near: (N, n), common: (n,) if it serves all; workers: threads. Also returns the number of branch columns, the solved
+    targets, their `rounding`, and those on an edge if the class has a slower solver for them.
     """
     runner, N = recorded_formula(arm, task, geometry), len(raw)
-    step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts: one set of buffers serves all
+    step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts, which can share buffers
     batch = empty_batch(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(raw), np.zeros(N)
     tip = None if common is None else position(arm, common)
 
     def part(rows: slice) -> list[Doubted]:
-        """Some rows, by a thread of its own; returns those on an edge."""
+        """Solve some rows in one thread; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
-        left: list[Doubted] = []
+        on_edge: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal, columns, beside = raw[chunk], None, near[chunk] if common is None else common
+            goal, columns, ref = raw[chunk], None, near[chunk] if common is None else common
             if task.orientation == "full":
                 goal, rounding[chunk], columns = read_poses(goal)
             target[chunk] = goal
@@ -63,11 +63,11 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
             first = goal[:, 0] if columns is None else cast("Array", columns[9])
             hits = np.empty(0, np.intp)
             if examine:
-                hits = near_itself.at_tip(arm, task, goal, position(arm, beside) if tip is None else tip, first)
-            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, beside, hits)
+                hits = near_itself.at_tip(arm, task, goal, position(arm, ref) if tip is None else tip, first)
+            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, ref, hits)
             if len(edge.rows):
-                left.append(edge._replace(rows=start + edge.rows))
-        return left
+                on_edge.append(edge._replace(rows=start + edge.rows))
+        return on_edge
 
     parts = [part(slice(0, N))] if workers == 1 else share_rows(part, N, workers, step, step)
     doubted = [chunk for one_part in parts for chunk in one_part]
@@ -85,10 +85,10 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
 
 
 def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, hits: Int) -> Doubted:
-    """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B), at their nearest legal copies; returns the
+    """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
     targets on an edge.
 
-    hits: `near_itself.at_tip`, none where that is not asked.
+    hits: the result of `near_itself.at_tip`, empty without examination.
     """
     arm = goals.arm
     *values, miss, doubt, free = outputs
@@ -125,23 +125,23 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], 
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
-    """Which targets are in doubt, or have a branch that is nearly there; miss, valid: (B, N); valid None: all are."""
+    """The targets that are in doubt or have a branch that nearly solves; miss, valid: (B, N); valid None: all valid."""
     N = miss.shape[1]
     if np.shape(doubt)[-1:] != (N,):
         doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))
     doubted = np.flatnonzero(doubt) % N
     if valid is not None:
         clear = miss > tol.NEARBY**2
-        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # nearly there, or not a number
+        if np.count_nonzero(clear) + np.count_nonzero(valid) < miss.size:  # some branch nearly solves, or is nan
             doubted = np.concatenate([doubted, np.flatnonzero(~(valid | clear)) % N])
     return np.unique(doubted) if len(doubted) else doubted
 
 
 class Columns(NamedTuple):
-    """Branches of some targets, as the formulas have them: a column an axis' last.
+    """Branches of some targets as arrays (B, N), without choice of their copies.
 
-    values: n arrays (B, N) [rad | mm], of turns any copy; miss: (B, N) squared residual; valid: (B, N); left: targets
-    on an edge, whose branches these are not.
+    values: n arrays (B, N) [rad | mm], modulo whole turns; miss: (B, N) squared residual; valid: (B, N); left: targets
+    on an edge, whose branches may be wrong.
     """
 
     rows: slice
@@ -152,11 +152,11 @@ class Columns(NamedTuple):
 
 
 def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool = False) -> Iterator[Columns]:
-    """Branches of targets (N, m) or (N, 4, 4) by a closed form, for those who count them and list none.
+    """Branches of targets (N, m) or (N, 4, 4) by a closed form, for callers that only count them.
 
-    kept: whether the arrays of each part stay when the next one is asked for.
+    kept: whether the arrays of a part stay valid when the next one is computed.
 
-    A target that is not `left` has the branches that `armkin.ik` finds; `left` are for `armkin.ik`.
+    Targets that are not `left` have the branches that `armkin.ik` finds; `left` ones must be solved by `armkin.ik`.
     """
     runner = recorded_formula(arm, task, geometry)
     step, B, tip = runner.code.at_once(), math.prod(runner.axes), position(arm, arm.home)
@@ -176,5 +176,5 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
 
 @lru_cache(maxsize=8)
 def _every_branch(B: int, N: int) -> NDArray[np.int8]:
-    """The indices of all branches of N targets, (N, B): kept, as copying them is quicker than repeating a row."""
+    """The indices of all branches of N targets, (N, B); cached, as copying is faster than repeating a row."""
     return np.tile(np.arange(B, dtype=np.int8), (N, 1))

@@ -1,4 +1,4 @@
-"""Targets with a nearly singular candidate: what goes to `singular.components`, and where its answers are written."""
+"""Targets with a nearly singular candidate: prepares their seeds for `singular.components`, and writes its answers."""
 
 from __future__ import annotations
 
@@ -14,17 +14,16 @@ from armkin.inverse.closed.candidates import Recorded, as_rows
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
 
-AT_ONCE = 1024  # targets examined together
+AT_ONCE = 1024  # targets examined in one call
 
 
 class _Doubts(NamedTuple):
-    """K targets on an edge: as rows of a batch (K,), candidates as the formulas have them (K, B, n), and with preferred
-    values for joints that are free: as near `near` first (K, B, n).
+    """K targets on an edge: rows of the batch (K,), and their candidates (K, B, n) from the formulas.
 
-    other: the same with other values, nan where these change nothing; loose: (K, B) which candidates they change;
-    free: (K,) whether a joint is; ends: (K,) targets on which the joints that the geometry calls ends are free;
-    narrow: (K,) those with solutions for a part of these values, which `near` is not in; simple: (K, B) branches that
-    are on no edge, of targets that `near` does not solve.
+    first: candidates with the values of `near` for free joints; other: with other values, nan where these change
+    nothing; loose: (K, B) which candidates they change; free: (K,) whether a joint is free; ends: (K,) whether joints
+    in the geometry's `ends` are free; narrow: (K,) whether only a range of values without `near` has solutions;
+    simple: (K, B) branches on no edge, of targets that `near` does not solve.
     """
 
     rows: Int
@@ -39,37 +38,37 @@ class _Doubts(NamedTuple):
 
 
 def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
-    """Decide what the targets `rows` are, which are on an edge: at most `AT_ONCE`.
+    """Decide the branches of the targets `rows`, which are on an edge, at most `AT_ONCE`.
 
-    Where a joint is free, the candidates are not all.
+    The candidates do not include all branches where a joint is free.
     """
     _, _, target, near = goals
     doubts = _doubted_targets(goals, runner, rows)
-    parts, left = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
+    parts, pending = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
     for part_rows, seeds in parts:
-        left[part_rows] = False
+        pending[part_rows] = False
         if runner.geometry.ends:
             batch = examine_targets(goals, batch, rows[part_rows], seeds, runner.others)
     unsettled = None
-    if left.any():
-        if len(part := np.flatnonzero(left & doubts.narrow)):  # there may be another part
+    if pending.any():
+        if len(part := np.flatnonzero(pending & doubts.narrow)):  # another range of values may have solutions
             narrow = rows[part]
             doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
             doubts.other[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
-        open_, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, left)
-        # seeds: with the preferred values for free joints, and what other values of these would change
-        more = [first, second] if loose.any() else [first]
+        left, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, pending)
+        # seeds with the preferred values for free joints, and those that other values change
+        seed_sets = [first, second] if loose.any() else [first]
         if runner.geometry.ends:
-            hangs: Bool = np.asarray(loose.any(axis=1))
-            more.append(np.where(hangs[:, None, None], tight, np.nan))  # it may be that the joint is not quite free
+            is_loose: Bool = np.asarray(loose.any(axis=1))
+            seed_sets.append(np.where(is_loose[:, None, None], tight, np.nan))
             unsettled = np.zeros(len(target), bool)
-            unsettled[open_[at_ends]], batch.complete[open_[at_ends]] = True, False
-        label = np.tile(np.arange(loose.shape[1]), len(more))
-        if len(more) > 1:
-            fixed = np.zeros((len(loose), (len(more) - 1) * loose.shape[1]), bool)
+            unsettled[left[at_ends]], batch.complete[left[at_ends]] = True, False
+        label = np.tile(np.arange(loose.shape[1]), len(seed_sets))
+        if len(seed_sets) > 1:
+            fixed = np.zeros((len(loose), (len(seed_sets) - 1) * loose.shape[1]), bool)
             loose, simple = (np.concatenate([x, fixed], axis=1) for x in (loose, simple))
-        seeds = Seeds.of(np.concatenate(more, axis=1), label, loose, simple)
-        parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(left), seeds)]
+        seeds = Seeds.of(np.concatenate(seed_sets, axis=1), label, loose, simple)
+        parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(pending), seeds)]
     elif runner.geometry.ends:
         return batch
     seeds = stack_rows([seeds for _, seeds in parts])
@@ -78,7 +77,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
 
 
 def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
-    """The targets whose self-motions are known in closed form, with their seeds."""
+    """The targets whose self-motions have a closed form, with their seeds."""
     settled: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
         return settled
@@ -94,7 +93,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
         ordered = np.take_along_axis(q, column[:, None, :, None], axis=2)
         linked = linkages.settle(subset, ordered, np.take_along_axis(loose, column, axis=1))
         if len(rows := np.flatnonzero(linked.known)):
-            # postures of known self-motions, and the candidates that are not loose, by their labels
+            # postures of known self-motions and candidates that are not loose, sorted by labels
             whose, present = part[rows], ~np.isnan(linked.q[rows, :, 0])
             places = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max())]
             fixed = np.where(loose[rows][:, :, None], np.nan, doubts.first[whose])
@@ -111,56 +110,56 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
                 simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, places.shape[1]))), order, axis=1),
             )
             settled.append((whose, seeds))
-        lacking = np.flatnonzero(linked.lacking)
-        part, q = part[lacking], q[lacking]
+        unknown = np.flatnonzero(linked.lacking)
+        part, q = part[unknown], q[unknown]
         if len(part):
-            q = np.concatenate([q, runner.samples(subset.target[lacking], subset.near[lacking])], axis=1)
+            q = np.concatenate([q, runner.samples(subset.target[unknown], subset.near[unknown])], axis=1)
     return settled
 
 
 def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
-    """The targets `rows`, with preferred values for joints that are free; what is on no edge and misses is nan."""
+    """The targets `rows` with values for free joints; candidates on no edge that miss their target are nan."""
     arm, task, target, near = goals.of(rows)
-    # whether a target is singular depends on the last digit: plain numbers give every batch the same
+    # the last digit may decide about singularity, so use plain numbers, which do not depend on the batch
     outputs = as_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
-    plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
-    plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False
-    gone = plain & (miss > tol.NEARBY**2)
+    is_plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
+    is_plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False
+    is_wrong = is_plain & (miss > tol.NEARBY**2)
     doubts = _Doubts(
         rows=rows,
-        tight=np.where(gone[:, :, None], np.nan, tight),
-        first=np.where(gone[:, :, None], np.nan, tight),
+        tight=np.where(is_wrong[:, :, None], np.nan, tight),
+        first=np.where(is_wrong[:, :, None], np.nan, tight),
         other=np.full(tight.shape, np.nan),
         loose=np.zeros(tight.shape[:2], bool),
         free=np.asarray((free > 0.0).any(axis=1)),
         ends=np.zeros(len(rows), bool),
         narrow=np.zeros(len(rows), bool),
-        simple=plain & (miss <= tol.ACCEPTED**2),
+        simple=is_plain & (miss <= tol.ACCEPTED**2),
     )
     part = np.flatnonzero(doubts.free)
     if len(part):
         goal, reference = target[part], near[part]
         first, second, solved = _candidates_at_two(runner, goal, reference, reference + 1.0)
-        apart = np.abs(first - second)
-        changed = ~((apart.max(axis=2) < tol.SAME) | plain[part])
+        differences = np.abs(first - second)
+        changed = ~((differences.max(axis=2) < tol.SAME) | is_plain[part])
         lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
-        if len(lost):  # solutions for some values of the free joints alone, or for one
+        if len(lost):  # only some values of the free joints, or one, have solutions
             shift, single = runner.best_shift(goal[lost], reference[lost], changed[lost])
             best = reference[lost] + shift
             first[lost], second[lost], solved = _candidates_at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
             doubts.narrow[part[lost]] = solved[1].any(axis=1)
             single &= ~doubts.narrow[part[lost]]
-            doubts.free[part[lost]], second[lost[single]] = ~single, np.nan  # one value alone is no freedom
-        doubts.first[part] = np.where(plain[part][:, :, None], doubts.first[part], first)
+            doubts.free[part[lost]], second[lost[single]] = ~single, np.nan  # one possible value is no freedom
+        doubts.first[part] = np.where(is_plain[part][:, :, None], doubts.first[part], first)
         doubts.other[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
-        apart = np.minimum(apart, np.abs(apart - 2 * np.pi))[:, :, list(runner.geometry.ends)]
-        doubts.ends[part] = (apart > tol.SAME).any(axis=(1, 2))
+        differences = np.minimum(differences, np.abs(differences - 2 * np.pi))[:, :, list(runner.geometry.ends)]
+        doubts.ends[part] = (differences > tol.SAME).any(axis=(1, 2))
     return doubts
 
 
 def _candidates_at_two(runner: Recorded, target: Array, values: Array, second: Array) -> tuple[Array, Array, Bool]:
-    """Candidates for two values of free joints, (N, B, n) each, and which solve their targets (2, N, B)."""
+    """Candidates for two values of free joints, (N, B, n) each, and whether they solve their targets (2, N, B)."""
     rows = runner.with_values(np.concatenate([target, target]), np.concatenate([values, second]))
     solved = rows[..., -1].reshape(2, len(target), -1) <= tol.ACCEPTED**2
     return rows[: len(target), :, :-1], rows[len(target) :, :, :-1], solved
@@ -169,9 +168,9 @@ def _candidates_at_two(runner: Recorded, target: Array, values: Array, second: A
 def examine_targets(
     goals: Goals, batch: Batch, doubted: Int, seeds: Seeds, more: components.More, unsettled: Bool | None = None
 ) -> Batch:
-    """Examine the doubted targets and write what is found: branches first, nan behind.
+    """Examine the doubted targets and write their branches, with nan behind.
 
-    seeds: candidates of these; more, unsettled: (N,), see `components.examine`.
+    seeds: their candidates; more, unsettled: (N,), see `components.examine`.
     """
     for part in slices(len(doubted), AT_ONCE):
         rows = doubted[part]

@@ -1,9 +1,9 @@
-"""Targets on an edge whose branches stand alone or meet in pairs: two Jacobians a pair tell which.
+"""Targets on an edge whose branches stand alone or meet in pairs, decided by two Jacobians for each pair.
 
-Most targets that a closed form doubts are a fold's two branches some 1e-4 rad apart. Between them the residual along
-the lost direction is a cubic: both its zeros and its slopes there are known, the slopes from the Jacobians bordered by
-that direction. Where the cubic leaves no doubt, what it tells is what `singular.local_structure` would; all other
-targets are left to `singular.components`.
+Most targets that a closed form doubts have the two branches of a fold some 1e-4 rad apart. The residual along the lost
+direction is a cubic between them, whose zeros are known, and whose slopes at them follow from the Jacobians bordered by
+that direction. Where the cubic is conclusive, it agrees with `singular.local_structure`; all other targets are left to
+`singular.components`.
 """
 
 from __future__ import annotations
@@ -22,16 +22,16 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import task_jacobian
 from armkin.model.units import radian_or_reach
 
-SURE_FACTOR = 1.02  # factor on SOLUTION or its inverse: what lies between the two bounds is looked at closely
-SYMMETRIC = 0.2  # difference, relative to their size, of the slopes at a pair's ends at most
-PAIR_DISTANCE = 10.0 * tol.SAME  # distance [rad, reaches] of two branches below which they are looked at closely
+SURE_FACTOR = 1.02  # results within this factor of SOLUTION are examined closely
+SYMMETRIC = 0.2  # largest relative difference of the slopes at a pair's ends
+PAIR_DISTANCE = 10.0 * tol.SAME  # closer branches [rad, reaches] are examined closely
 
 
 class Doubted(NamedTuple):
-    """K targets on an edge, as the formulas have them: rows of the batch (K,), candidates q (K, B, n), squared
+    """K targets on an edge and their results from formulas: rows of the batch (K,), candidates q (K, B, n), squared
     residuals miss (K, B), and which candidates are on an edge (K, B).
 
-    plain: (K,) whether no joint is free, and `near` is elsewhere.
+    plain: (K,) whether no joint is free and `near` does not solve the target.
     """
 
     rows: Int
@@ -42,18 +42,18 @@ class Doubted(NamedTuple):
 
 
 def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:
-    """Write what the doubted targets are that can be told; returns the rows of those that are left.
+    """Write the doubted targets that can be decided; returns the rows of the others.
 
-    What stands alone is in the batch already, but for what misses a little; of two branches that meet the first is
-    listed, as the target has it alone.
+    Branches that stand alone are in the batch already, except those with a small residual. Of two branches that meet
+    the first is listed, with the values that it has for this target alone.
     """
     arm, task, target, near = goals
     solving = doubted.miss <= tol.SOLUTION**2
-    moved = solving & (doubted.miss >= tol.CLOSED**2)
-    # a candidate that misses by a little more may be a branch
-    far = doubted.miss > np.where(doubted.edge, tol.SEED**2, tol.NEARBY**2)
-    decided: Bool = np.asarray(doubted.plain & solving.any(axis=1) & (solving | far).all(axis=1))
-    k, b = np.nonzero(moved & decided[:, None])
+    to_correct = solving & (doubted.miss >= tol.CLOSED**2)
+    # a candidate with a slightly larger residual may be a branch
+    is_wrong = doubted.miss > np.where(doubted.edge, tol.SEED**2, tol.NEARBY**2)
+    decided: Bool = np.asarray(doubted.plain & solving.any(axis=1) & (solving | is_wrong).all(axis=1))
+    k, b = np.nonzero(to_correct & decided[:, None])
     if len(k):
         doubted.q[k, b], size = newton.correct(arm, task, doubted.q[k, b], target[doubted.rows[k]], steps=3)
         decided[k[size >= tol.CLOSED]] = False
@@ -73,8 +73,8 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
 
 
 def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
-    """Which of the near roots (K, B) are the second ones of two that meet; takes those targets from decided
-    (K,) that the curvature does not tell."""
+    """Which near roots (K, B) are the second of two that meet; clears `decided` (K,) where the curvature is not
+    conclusive."""
     second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
     k, b = np.nonzero(near_roots)
     if not len(k):
@@ -83,26 +83,26 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     number[k, b] = np.arange(len(k))
     row, i, j = np.nonzero(np.triu(near_roots[:, :, None] & near_roots[:, None], 1))
     i, j = number[row, i], number[row, j]
-    way = newton.difference(goals.arm, q[j], q[i])
-    close = np.abs(way).max(axis=1) < tol.CLOSE_BY
+    step = newton.difference(goals.arm, q[j], q[i])
+    close = np.abs(step).max(axis=1) < tol.CLOSE_BY
     partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
     decided[k[partners > 1]] = False
-    if not decided[k].all():  # no Jacobians of those
+    if not decided[k].all():  # without Jacobians of undecided targets
         return _second_of_pairs(goals, doubted, near_roots, decided)
-    i, j, way = i[close], j[close], way[close]
-    double = np.abs(way).max(axis=1) < PAIR_DISTANCE
+    i, j, step = i[close], j[close], step[close]
+    double = np.abs(step).max(axis=1) < PAIR_DISTANCE
     inverse, beside = _inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
-    partners[i[double]], weak[i[double]] = 0, True  # the first of a double root's two stands for both
+    partners[i[double]], weak[i[double]] = 0, True  # the first root of a double one represents both
     lone = np.flatnonzero(weak & (partners == 0) & decided[k])
     if len(lone):
         isolated, turns = _by_curvature(goals, q[lone], inverse[lone], beside[lone])
         decided[k[lone[~np.where(np.isin(lone, i[double]), turns, isolated)]]] = False
         second[k[j[double]], b[j[double]]] = True
-        i, j, way = i[~double], j[~double], way[~double]
+        i, j, step = i[~double], j[~double], step[~double]
     if len(i):
         ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
-        alone, meet = _cubic(way, inverse[i], ends)
+        alone, meet = _cubic(step, inverse[i], ends)
         decided[k[i[~(alone | meet)]]] = False
         second[k[j[meet]], b[j[meet]]] = True
     return second
@@ -111,8 +111,8 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
 def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
     """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled`.
 
-    A Jacobian with a row more than columns has one beside these, (M, rows, 1): by default the direction of the target
-    that no joint moves the tool in.
+    A Jacobian with one row more than columns is completed by a column `beside` (M, rows, 1), by default the direction
+    in which no joint moves the tool.
     """
     arm, task = goals.arm, goals.task
     T, slopes = tip_and_jacobian(arm, q)
@@ -128,38 +128,39 @@ def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Arra
 
 
 def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
-    """Which of P pairs, `way` (P, n) apart, stand alone, and which meet, (P,), by the inverses of their Jacobians.
+    """Which of P pairs with differences `way` (P, n) stand alone, and which meet, (P,), by inverses of their Jacobians.
 
-    g along u is zero at both ends; a curve that keeps all other numbers of the target has the slope 1 / (v' J^-1 u).
+    The residual g along u is 0 at both ends; its slope on a curve that keeps all other numbers of the target is
+    1 / (v' J^-1 u).
     """
-    far = np.sqrt((way * way).sum(axis=1))
-    v = _tangents(way / np.maximum(far, PAIR_DISTANCE)[:, None], first)
+    d = np.sqrt((way * way).sum(axis=1))
+    v = _tangents(way / np.maximum(d, PAIR_DISTANCE)[:, None], first)
     u = _unit(v @ first)
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, lost_second = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
         rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
-        size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / far, np.abs(rise + fall)
-        # the fourth derivative is taken for as large as that of the sharpest fold
-        plain = _one_direction_lost(first, lost, u) & (far > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
-        alone = plain & (0.125 * far * size - tol.CURVATURE * far**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
-        # up to where the residual of two branches that meet may be 2 SOLUTION
-        end = far + 2.0 * np.sqrt(tol.SOLUTION / bend)
-        straight = 6.0 * uneven / far**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
+        size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / d, np.abs(rise + fall)
+        # assume the fourth derivative of the sharpest fold
+        plain = _one_direction_lost(first, lost, u) & (d > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
+        lone = plain & (0.125 * d * size - tol.CURVATURE * d**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
+        # where two branches that meet may have a residual of 2 SOLUTION
+        end = d + 2.0 * np.sqrt(tol.SOLUTION / bend)
+        is_straight = 6.0 * uneven / d**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
         # the direction in which no joint moves the tool counts as well
-        across = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
-        meet = plain & straight & (0.125 * far * (size + across) < tol.SOLUTION / SURE_FACTOR)
-    return np.asarray(alone), np.asarray(meet)
+        sideways = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
+        meet = plain & is_straight & (0.125 * d * (size + sideways) < tol.SOLUTION / SURE_FACTOR)
+    return np.asarray(lone), np.asarray(meet)
 
 
 def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tuple[Bool, Bool]:
-    """Which weak postures (M, n), with no other close by, are isolated roots: g passes `SOLUTION` before it turns,
-    and which are boundaries: it turns before."""
+    """Which weak postures (M, n) without a neighbour are isolated roots, where g exceeds `SOLUTION` before an extremum,
+    and which are boundaries, where the extremum comes first."""
     n = q.shape[1]
-    # the columns of J^-1 are nearly along the lost direction v, the longest one most of all
-    moved = inverse[:, :n]
-    largest = (moved * moved).sum(axis=1).argmax(axis=1)
-    v = np.take_along_axis(moved, largest[:, None, None], axis=2)
-    v = _unit((moved @ (moved.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
+    # the columns of J^-1 are nearly along the lost direction v, the longest one most
+    joint_rows = inverse[:, :n]
+    largest = (joint_rows * joint_rows).sum(axis=1).argmax(axis=1)
+    v = np.take_along_axis(joint_rows, largest[:, None, None], axis=2)
+    v = _unit((joint_rows @ (joint_rows.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
     way = tol.FOLD_WAY * v * radian_or_reach(goals.arm)
     ends, _ = _inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
     v = _tangents(v, inverse)
@@ -167,17 +168,17 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
         slope = np.abs(1.0 / (v @ lost)[:, 0, 0])
-        ahead, behind = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
-        bend, passed = np.abs(ahead - behind) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
-        steep = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
+        rise, fall = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
+        bend, passed = np.abs(rise - fall) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
+        sharp = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
         end = 4.0 * np.sqrt(tol.SOLUTION / bend)
-        flat = (np.abs(ahead + behind) < SYMMETRIC * np.abs(ahead - behind)) & (slope**2 < tol.SOLUTION * bend)
+        level = (np.abs(rise + fall) < SYMMETRIC * np.abs(rise - fall)) & (slope**2 < tol.SOLUTION * bend)
     one, square = _one_direction_lost(inverse, lost, u), beside.shape[2] == 0
-    return np.asarray(one & (passed < tol.FOLD_WAY) & steep), np.asarray(one & (end < tol.FOLD_WAY) & flat & square)
+    return np.asarray(one & (passed < tol.FOLD_WAY) & sharp), np.asarray(one & (end < tol.FOLD_WAY) & level & square)
 
 
 def _tangents(v: Array, inverse: Array) -> Array:
-    """Directions of joints (M, n) as rows (M, 1, rows): what stands beside the joints does not move."""
+    """Directions of joints (M, n) as rows (M, 1, rows), with 0 for the column beside the joints."""
     rows = np.zeros((len(v), 1, inverse.shape[1]))
     rows[:, 0, : v.shape[1]] = v
     return rows
@@ -189,6 +190,6 @@ def _unit(rows: Array) -> Array:
 
 
 def _one_direction_lost(inverse: Array, lost: Array, u: Array) -> Bool:
-    """Whether one direction alone is lost, by an upper bound of what the others make of inverses; lost: J^-1 u."""
+    """Whether only one direction is lost, by an upper bound of the inverse in all others; lost: J^-1 u."""
     remaining = inverse - lost @ u
     return np.asarray((remaining * remaining).sum(axis=(1, 2)) * tol.HIGH**2 < 1.0)

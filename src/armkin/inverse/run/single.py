@@ -1,6 +1,6 @@
-"""One target of a closed form in plain numbers: for one pose a call of numpy costs more than what it computes.
+"""Solves one target of a closed form in plain numbers, as numpy's calls cost more than the work for one pose.
 
-The operations are those of a batch; what is not plain (an edge, a rounded rotation, a far slide) is left to it.
+The operations are those of a batch. Special targets (an edge, a rounded rotation, a far slide) are left to the batch.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from armkin.model.units import TURN, radian_or_reach
 
 @lru_cache(maxsize=64)
 def short_way(arm: Arm, task: str | None) -> OneTarget | None:
-    """The short way of an arm and task, prepared at its first use; None if there is none."""
+    """The solver for single targets of an arm and task, prepared at its first use; None without a closed form."""
     if actual_arm(arm) is not arm or solver(arm, task)[1].pairs is None:
         return None
     return OneTarget(arm, task)
@@ -55,12 +55,12 @@ class OneTarget:
         self._close = [tol.THERE * unit for unit in radian_or_reach(arm).tolist()]
         output_axes, axes = runner.code.axes(), runner.axes
         self.count = math.prod(axes)
-        self._plain = [not a for a in output_axes]  # outputs that are a number, not a tuple
+        self._plain = [not a for a in output_axes]  # whether an output is a number instead of a tuple
         places = [np.broadcast_to(np.arange(math.prod(a)).reshape(a), axes).ravel() for a in output_axes[: arm.n + 1]]
         first = np.cumsum([0, *(math.prod(a) for a in output_axes[: arm.n - 1])])
-        # joint after joint, the values of every branch
+        # indices of every branch's joint values in the outputs
         index = np.stack(places[: arm.n], axis=1) + first
-        self._rows = [itemgetter(*row, row[0]) for row in index.tolist()]  # one more: of one alone it makes no tuple
+        self._rows = [itemgetter(*row, row[0]) for row in index.tolist()]  # one item more, as one makes no tuple
         self._all = itemgetter(*index.ravel().tolist(), 0)
         self._misses = itemgetter(*places[-1].tolist(), 0)
         self._base, self._reach = arm.link[0][: self.position, 3].tolist(), arm.reach
@@ -69,7 +69,7 @@ class OneTarget:
         self._same["names"] = branch_names(arm, definition, geometry, self.count)
 
     def solve(self, target: Array, given_near: ArrayLike | None) -> Solutions | None:  # noqa: C901 - as nearest_number
-        """The branches of a single target; None if it is a batch, or if there is more to it. given_near: `near`."""
+        """The branches of a single target; None for a batch or a special target. given_near: `near`."""
         if target.shape != self.shape:
             return None
         near = self._home
@@ -105,26 +105,26 @@ class OneTarget:
         if len(solving) < self.count and sum(m > tol.NEARBY**2 for m in misses) + len(solving) < self.count:
             return None
         tip = self._home_tip if near is self._home else self._point(*near.tolist())
-        away = math.dist(point, tip[: self.position])
-        at_near = away <= self._room
-        if not at_near and away <= self._coarse and all(abs(x - round(x)) <= ROUNDED for x in goal[:9]):
-            return None  # `near` may solve it to within a rounding that its position alone shows
+        distance = math.dist(point, tip[: self.position])
+        at_near = distance <= self._room
+        if not at_near and distance <= self._coarse and all(abs(x - round(x)) <= ROUNDED for x in goal[:9]):
+            return None  # `near` may solve it within a rounding that only its position shows
         return self._found(own_target, near, values, solving, defect, at_near)
 
     def _beside(self, near: list[float], legal: list[float], solving: list[int]) -> int | None:
-        """Which of the branches that are there, at their nearest legal copies, is at `near`; None if none is."""
+        """Which of the solving branches, at their nearest legal copies, is at `near`; None if none is."""
         for place, b in enumerate(solving):
             ways = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
-            if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= most for v, c, j, most in ways):
+            if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= bound for v, c, j, bound in ways):
                 return place
         return None
 
     def _found(
         self, target: Array, near: Array, values: Sequence[Any], solving: list[int], defect: float, at_near: bool
     ) -> Solutions | None:
-        """The branches that are there, at their nearest legal copies, nan behind; None where `near` may be another.
+        """The solving branches at their nearest legal copies, nan behind them; None if `near` may be another branch.
 
-        at_near: whether the tool is at the target where the joints are at `near`.
+        at_near: whether the tool is at the target with the joints at `near`.
         """
         legal: list[float] = []
         inside: list[bool] = []
@@ -156,7 +156,7 @@ class OneTarget:
         ], np.int8)  # fmt: skip
         flags = block.view(np.bool_)
         end = 3 * B + n
-        solutions = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one
+        solutions = Solutions.__new__(Solutions)  # faster than the constructor of a frozen class
         solutions.__dict__.update(
             self._same,
             target=target,

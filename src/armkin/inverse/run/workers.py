@@ -1,4 +1,4 @@
-"""Threads that share a batch: numpy and C run without Python's lock, and every target is solved as if alone."""
+"""Threads that share a batch, which is possible since numpy and C release Python's lock and targets are independent."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ Result = TypeVar("Result")
 
 
 def share_rows(part: Callable[[slice], Result], count: int, workers: int, least: int, step: int = 1) -> list[Result]:
-    """``part(rows)`` of all rows, in their order, by that many threads.
+    """``part(rows)`` of all rows, in their order, by `workers` threads.
 
-    least: rows that are worth a thread; step: of which shares are multiples. One worker gets all rows at once.
+    least: fewest rows of a thread; step: shares are multiples of it. One worker gets all rows at once.
     Raises UsageError for less than one worker.
     """
     check_workers(workers)
-    share = max(least, -(-count // (4 * workers)))  # four each: one that is slow does not keep the others waiting
+    share = max(least, -(-count // (4 * workers)))  # four shares each, so that a slow thread does not delay the others
     share += -share % step
     rows = [slice(start, min(start + share, count)) for start in range(0, count, share)]
     if workers == 1 or len(rows) < 2:
@@ -30,7 +30,7 @@ def share_rows(part: Callable[[slice], Result], count: int, workers: int, least:
 
 
 def check_workers(workers: int) -> None:
-    """Raises UsageError for a number of threads below one, and for what is no whole number."""
+    """Raise UsageError for a number of threads that is below one or not whole."""
     if not isinstance(workers, Integral):
         raise UsageError(f"workers: {workers!r}; a whole number of threads is needed")
     if workers < 1:
