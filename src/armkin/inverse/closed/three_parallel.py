@@ -108,8 +108,8 @@ class ThreeParallel:
         across, height = self.three_link.miss(pairs, p)
         along = pose.turn_direction(self.to_joint2, _turned_back(c1, s1, X[6:9]))
         scale = 1.0 / self.reach**2
-        height_miss = height * scale + sub.distance2(along, [0.0, 0.0, self.three_link.sense4])
-        return Candidates([first, *pairs, fifth, sixth], doubt, across * scale + height_miss, [None, *angles, None, None])
+        offset = height * scale + sub.distance2(along, [0.0, 0.0, self.three_link.sense4])
+        return Candidates([first, *pairs, fifth, sixth], doubt, across * scale + offset, [None, *angles, None, None])
 
     def _shoulder_joint(self, D: Pose, prefer: Pair | None) -> tuple[Pair, Doubt]:
         """Joint 1: where axes 5 and 6 meet has a known height along n. D: joint 6's frame seen from joint 1."""
