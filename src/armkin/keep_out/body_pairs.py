@@ -89,35 +89,46 @@ class Guard:
         most are too far to be the nearest, and only the others are looked at.
         """
         a, b = segment_ends(self.arm, q)
-        middle, way = (a + b) / 2, b - a
-        half = np.sqrt(np.einsum("ksn,ksn->sn", way, way)) / 2
-        radius, moving = self.bodies.radius[self.bodies.owner][:, None], self.moving
-        i, j = self.ours, self.theirs
-        most = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
-        nearer = [half[moving]] * len(most)
-        if len(i):
-            apart = middle[:, i] - middle[:, j]
-            most.append(np.sqrt(np.einsum("ksn,ksn->sn", apart, apart)) - radius[i] - radius[j])
-            nearer.append(half[i] + half[j])
-        distances = np.full((sum(map(len, most)), len(q)), np.inf)
-        bound = np.min([part.min(axis=0) for part in most if len(part)], axis=0) + 1e-9 * self.arm.reach
+        of_middles, halves = self._middle_distances(a, b)
+        bound = np.min([part.min(axis=0) for part in of_middles if len(part)], axis=0) + 1e-9 * self.arm.reach
+        distances = np.full((sum(map(len, of_middles)), len(q)), np.inf)
         row = 0
-        for k, (far, least) in enumerate(zip(most, nearer, strict=True)):
-            s, n = np.nonzero(far - least <= bound)
-            if k < len(self.obstacles):
-                segment = moving[s]
-                exact = self.obstacles[k][1].distance(a[:, segment, n], b[:, segment, n]) - radius[segment, 0]
-            else:
-                segment, other_segment = i[s], j[s]
-                exact = (
-                    segment_distance(a[:, segment, n], b[:, segment, n], a[:, other_segment, n], b[:, other_segment, n])
-                    - radius[segment, 0]
-                    - radius[other_segment, 0]
-                )
-            distances[row + s, n] = exact
+        for k, (far, half) in enumerate(zip(of_middles, halves, strict=True)):
+            segments, poses = np.nonzero(far - half <= bound)
+            distances[row + segments, poses] = self._exact_distances(k, a, b, segments, poses)
             row += len(far)
         nearest = distances.argmin(axis=0)
         return distances[nearest, np.arange(len(q))], self._pair_of_row[nearest]
+
+    def _middle_distances(self, a: Array, b: Array) -> tuple[list[Array], list[Array]]:
+        """Distances (S, N) of the segments' middles from each obstacle, and at last from each other; and by how much
+        the segments (S, N) may be nearer: half their length."""
+        middle, way = (a + b) / 2, b - a
+        half = np.sqrt(np.einsum("ksn,ksn->sn", way, way)) / 2
+        radius, moving = self._segment_radius[:, None], self.moving
+        i, j = self.ours, self.theirs
+        distances = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
+        halves = [half[moving]] * len(distances)
+        if len(i):
+            apart = middle[:, i] - middle[:, j]
+            distances.append(np.sqrt(np.einsum("ksn,ksn->sn", apart, apart)) - radius[i] - radius[j])
+            halves.append(half[i] + half[j])
+        return distances, halves
+
+    def _exact_distances(self, k: int, a: Array, b: Array, rows: NDArray[np.intp], poses: NDArray[np.intp]) -> Array:
+        """Distances (M,) from obstacle k, or of segments from each other, of rows of `_middle_distances` at poses."""
+        radius = self._segment_radius
+        if k < len(self.obstacles):
+            segment = self.moving[rows]
+            return self.obstacles[k][1].distance(a[:, segment, poses], b[:, segment, poses]) - radius[segment]
+        i, j = self.ours[rows], self.theirs[rows]
+        axes_apart = segment_distance(a[:, i, poses], b[:, i, poses], a[:, j, poses], b[:, j, poses])
+        return axes_apart - radius[i] - radius[j]
+
+    @cached_property
+    def _segment_radius(self) -> Array:
+        """Radius (S,) [mm] of each segment's body."""
+        return np.asarray(self.bodies.radius[self.bodies.owner])
 
     @cached_property
     def _pair_of_row(self) -> NDArray[np.intp]:

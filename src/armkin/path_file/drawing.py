@@ -53,6 +53,11 @@ class DrawingOptions:
     grip_by: str | None = None  # M3 or M106
 
 
+def _speed_key(speed: float | None) -> dict[str, float]:
+    """The key of a move's speed [mm/s]; none where it is as fast as the joints go."""
+    return {} if speed is None else {"tool_speed": max(speed, MIN_TOOL_SPEED)}
+
+
 class Pen:
     """Draws moves one after another; straight ones of the same speed become one polyline."""
 
@@ -72,9 +77,8 @@ class Pen:
     def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
-            speed_key = {} if speed is None else {"tool_speed": max(speed, MIN_TOOL_SPEED)}
             opened: list[Sequence[float]] = []
-            self._add(Move.model_construct({"polyline"}, polyline=opened, **speed_key), line)
+            self._add(Move.model_construct({"polyline"}, polyline=opened, **_speed_key(speed)), line)
             self._open, self._speed = opened, speed
             self._drawn.append(opened)
         self._open.append(p)
@@ -85,7 +89,6 @@ class Pen:
     ) -> None:
         """An arc or helix from a to b about an axis, by an angle [rad] (positive: right-handed)."""
         self.points += 1
-        speed_key = {} if speed is None else {"tool_speed": max(speed, MIN_TOOL_SPEED)}
         rise = sum(n * (y - x) for n, x, y in zip(normal, a, b, strict=True))
         radial = [x - c for x, c in zip(a, centre, strict=True)]
         lift = sum(n * o for n, o in zip(normal, radial, strict=True))
@@ -99,19 +102,18 @@ class Pen:
             across = cross(normal, (radial[0], radial[1], radial[2]))
             end = math.dist(base, b)  # it may differ a little from the radius at the start
             half, mean = angle / 2, (radius + end) / 2 / radius
-            via = [
-                c + mean * (math.cos(half) * o + math.sin(half) * w)
-                for c, o, w in zip(base, radial, across, strict=True)
-            ]
-            made = Arc.model_construct(via=self.placing.point(via), to=self.placing.point(b))
-            self._add(Move.model_construct({"arc"}, arc=made, **speed_key), line)
+            ways = [math.cos(half) * o + math.sin(half) * w for o, w in zip(radial, across, strict=True)]
+            via = [c + mean * way for c, way in zip(base, ways, strict=True)]
+            three_points = Arc.model_construct(via=self.placing.point(via), to=self.placing.point(b))
+            self._add(Move.model_construct({"arc"}, arc=three_points, **_speed_key(speed)), line)
             return
-        direction = self.placing.direction(normal)
-        turns, scale = angle / _FULL_TURN, self.placing.scale
-        made_circle = Circle.model_construct(
-            centre=self.placing.point(base), normal=direction, turns=turns, rise=rise * scale
+        circle = Circle.model_construct(
+            centre=self.placing.point(base),
+            normal=self.placing.direction(normal),
+            turns=angle / _FULL_TURN,
+            rise=rise * self.placing.scale,
         )
-        self._add(Move.model_construct({"circle"}, circle=made_circle, **speed_key), line)
+        self._add(Move.model_construct({"circle"}, circle=circle, **_speed_key(speed)), line)
 
     def home(self, line: int) -> None:
         """A joint move home."""

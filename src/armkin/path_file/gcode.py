@@ -145,8 +145,7 @@ class _Program:
 
     def _sort_words(self) -> tuple[list[float], list[float], dict[str, float]]:
         """The line's G and M codes, and its other words."""
-        codes: list[float] = []
-        m_codes: list[float] = []
+        codes, m_codes = list[float](), list[float]()
         values: dict[str, float] = {}
         groups: dict[str, str] = {}
         for letter, number, word in self.words:
@@ -187,15 +186,14 @@ class _Program:
 
     def _dwell(self, values: dict[str, float], seconds: float | None) -> None:
         """G4 with P or S, both in seconds."""
-        time = values.pop("P", seconds)
-        if time is None:
-            time = 0.0
+        time = values.pop("P", seconds) or 0.0
         if not 0 <= time <= 86400:
             raise self._error(f"G4 waits 0 to 86400 seconds, not {time:g}")
         if time > 0:
             self.pen.wait(time, self.line)
 
     def _set_modes(self, codes: list[float]) -> None:
+        """Plane, unit, absolute or relative numbers, coordinate system and kind of motion, until others are set."""
         for code in codes:
             if code in _PLANES:
                 self.plane = code
@@ -209,6 +207,7 @@ class _Program:
                 self.motion = code
 
     def _offsets_and_motion(self, codes: list[float], values: dict[str, float]) -> None:
+        """What a line does with its axes' words: home, set a zero, or move; takes them out of `values`."""
         if 28.0 in codes:
             for letter in AXES:
                 values.pop(letter, None)
@@ -267,6 +266,7 @@ class _Program:
         return goal[0], goal[1], goal[2]
 
     def _move(self, values: dict[str, float], machine: bool) -> None:
+        """A line or an arc to where the words lead, which are taken out of `values`; machine: its coordinates."""
         if self.motion is None:
             raise self._error("axes' words, and neither G0, G1, G2 nor G3 before them")
         word = _MOTION[self.motion]

@@ -22,11 +22,11 @@ def arc(
     plane: its two axes, and the one across; unit: [mm]. Raises ArcError.
     """
     x, y, across = plane
-    sense = -1.0 if word == "G2" else 1.0
+    sense = _sense(word)
     turns = values.pop("P", 1.0)
     if turns != int(turns) or not 1 <= turns <= 1000:
         raise ArcError(f"{word} P{turns:g}: turns are whole, 1 to 1000")
-    centre = _centre(word, plane, values, unit, a, b, sense)
+    centre = _centre(word, plane, values, unit, a, b)
     radius, miss = _radius(plane, centre, a, b)
     if miss > _OFF[2] or (miss > _OFF[0] and miss > _OFF[1] * radius):
         raise ArcError(f"{word} ends {miss:.4g} mm off its circle of {radius:.6g} mm")
@@ -39,10 +39,13 @@ def arc(
     return centre, normal, sense * (angle + 2 * math.pi * (turns - 1))
 
 
-def _centre(
-    word: str, plane: tuple[int, int, int], values: dict[str, float], unit: float, a: Point, b: Point, sense: float
-) -> Point:
-    """The centre by I, J and K, which count from a, or by R."""
+def _sense(word: str) -> float:
+    """1 counter-clockwise, -1 clockwise, seen against the third axis."""
+    return -1.0 if word == "G2" else 1.0
+
+
+def _centre(word: str, plane: tuple[int, int, int], values: dict[str, float], unit: float, a: Point, b: Point) -> Point:
+    """The centre by I, J and K, which count from a, or by R; takes these words out of `values`."""
     x, y, across = plane
     offsets = {k: values.pop(letter) * unit for k, letter in enumerate("IJK") if letter in values}
     if across in offsets:
@@ -53,7 +56,7 @@ def _centre(
         return a[0] + offsets.get(0, 0.0), a[1] + offsets.get(1, 0.0), a[2] + offsets.get(2, 0.0)
     if offsets:
         raise ArcError(f"{word} has R and {'IJK'[next(iter(offsets))]}: one of them")
-    return _centre_by_radius(word, plane, values.pop("R") * unit, a, b, sense)
+    return _centre_by_radius(word, plane, values.pop("R") * unit, a, b)
 
 
 def _radius(plane: tuple[int, int, int], centre: Point, a: Point, b: Point) -> tuple[float, float]:
@@ -80,7 +83,7 @@ def _equalised_centre(plane: tuple[int, int, int], centre: Point, a: Point, b: P
     return moved[0], moved[1], moved[2]
 
 
-def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point, b: Point, sense: float) -> Point:
+def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point, b: Point) -> Point:
     """The centre of an arc of radius |r|, above 0 of at most half a turn, below 0 of more."""
     x, y, _ = plane
     dx, dy = b[x] - a[x], b[y] - a[y]
@@ -89,7 +92,7 @@ def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point
         raise ArcError(f"{word} with R begins where it ends: a whole circle needs I, J or K")
     if chord > 2 * abs(r) * (1 + 1e-6) + 2 * _OFF[0]:
         raise ArcError(f"{word} R{r:g} is shorter than half of its chord of {chord:.6g} mm")
-    rise = math.sqrt(max(r * r - chord * chord / 4, 0.0)) * sense * (1 if r > 0 else -1)
+    rise = math.sqrt(max(r * r - chord * chord / 4, 0.0)) * _sense(word) * (1 if r > 0 else -1)
     centre = list(a)
     centre[x] += dx / 2 - rise * dy / chord
     centre[y] += dy / 2 + rise * dx / chord

@@ -47,6 +47,7 @@ def above_zero(attributes: Mapping[str, str], *keys: str) -> list[float | None]:
 
 
 def _check_bound(value: float) -> float:
+    """The number, if it is finite and not too large."""
     if not abs(value) <= _MAX_NUMBER:
         raise ShapeError(f"the number {value:g} is larger than {_MAX_NUMBER:g}")
     return value
@@ -80,6 +81,7 @@ def parse_transform(text: str) -> Matrix:
 
 
 def _one_transform(kind: str, v: list[float]) -> Matrix:
+    """The matrix of one function of a transform attribute (SVG 1.1, section 7.6)."""
     n = len(v)
     if kind == "matrix" and n == 6:
         return v[0], v[1], v[2], v[3], v[4], v[5]
@@ -260,6 +262,7 @@ def _skip_gap(d: str, index: int) -> int:
 
 
 def _command_values(d: str, index: int, command: str) -> tuple[list[float], int]:
+    """The numbers of one command from an index of the path data on, and the index behind them."""
     values: list[float] = []
     for k in range(_COMMANDS[command.upper()]):
         index = _skip_gap(d, index)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -107,23 +107,9 @@ def _break_times(plan: PathPlan) -> list[float]:
 def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     """The tip's way, the arm at its start and end, where it is nearest to a singularity, and on other branches."""
     arm = plan.arm
-    poses: list[tuple[str, Array, str, float, Any]] = [
-        ("start", q[0], "#1f77b4", 4.5, "-"),
-        ("end", q[-1], "#2ca02c", 2.0, "-"),
-    ]
-    if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
-        s, value, posture = plan.nearest_singularity
-        label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
-        poses.append((label, posture, _SINGULAR_COLOUR, 1.6, (0, (3, 2))))
-    starts = _other_starts(plan)
-    plural = len(starts) != 1
-    label = (
-        f"{len(starts)} other branch{'es' * plural} that {'carry' if plural else 'carries'} all, at the path's start"
-    )
-    labels = [label, *[f"_{label}"] * len(starts)]  # matplotlib leaves what begins with _ out of its legend
-    poses = [*((text, pose, "#b0b0b0", 1.6, "-") for text, pose in zip(labels, starts, strict=False)), *poses]
-    bones = [(name, skeleton(arm, pose), *look) for name, pose, *look in poses]
-    points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for _, bone, *_ in bones)])
+    poses = [*_poses_of_others(plan), *_poses_of_plan(plan, q)]
+    bones = [skeleton(arm, pose.q) for pose in poses]
+    points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for bone in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
     size = float((points.max(axis=0) - points.min(axis=0)).max())
     way = _tool_way(plan)
@@ -132,9 +118,10 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     way = _thin_out(way, _POINT_SIZE * (size if large else small))
     low, high = (0.03, 0.76) if large else (0.37, 0.44)
     axes = space_axes(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
-    for name, bone, colour, width, dashes in bones:
-        axes.plot(*bone.path.T, color=colour, linewidth=width, linestyle=dashes, label=name, solid_capstyle="round")
-        axes.plot(*bone.joints.T, color=colour, marker="o", markersize=4, linestyle="none")
+    for pose, bone in zip(poses, bones, strict=True):
+        look = {"color": pose.colour, "linewidth": pose.width, "linestyle": pose.dashes}
+        axes.plot(*bone.path.T, **look, label=pose.label, solid_capstyle="round")
+        axes.plot(*bone.joints.T, color=pose.colour, marker="o", markersize=4, linestyle="none")
     if not large:
         _draw_from_near(plan, figure, way)
     axes.plot(*(way if len(way) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
@@ -149,6 +136,35 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
         frameon=False,
     )
     true_proportions(axes, points, float(arm.base[2, 3]))
+
+
+class _DrawnPose(NamedTuple):
+    """A pose of the arm in the picture."""
+
+    label: str
+    q: Array  # (n,) [rad | mm]
+    colour: str
+    width: float  # [points]
+    dashes: Any = "-"  # matplotlib's line style
+
+
+def _poses_of_plan(plan: PathPlan, q: Array) -> list[_DrawnPose]:
+    """The plan's first and last pose, of joint values q (N, n), and the one nearest to a singularity."""
+    poses = [_DrawnPose("start", q[0], "#1f77b4", 4.5), _DrawnPose("end", q[-1], "#2ca02c", 2.0)]
+    if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
+        s, value, posture = plan.nearest_singularity
+        label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
+        poses.append(_DrawnPose(label, posture, _SINGULAR_COLOUR, 1.6, (0, (3, 2))))
+    return poses
+
+
+def _poses_of_others(plan: PathPlan) -> list[_DrawnPose]:
+    """The path's start on the branches that would carry it as well; one of them stands in the legend."""
+    starts = _other_starts(plan)
+    branches = "1 other branch that carries" if len(starts) == 1 else f"{len(starts)} other branches that carry"
+    label = f"{branches} all, at the path's start"
+    labels = [label, *[f"_{label}"] * len(starts)]  # matplotlib leaves what begins with _ out of its legend
+    return [_DrawnPose(text, start, "#b0b0b0", 1.6) for text, start in zip(labels, starts, strict=False)]
 
 
 def _tool_way(plan: PathPlan) -> Array:

@@ -359,13 +359,9 @@ class RobotKeys(Model):
         """The motors, whether they are written as `motors` or as the joints' drives; () if there are none."""
         if self.motors is not None:
             return self.motors
-        return tuple(
-            Motor.model_construct(
-                joint.drive.model_fields_set | {"name", "joints"},
-                **dict(joint.drive),
-                name=joint.name,
-                joints={joint.name: 1.0},
-            )
-            for joint in self.joints
-            if joint.drive is not None
-        )
+        motors = []
+        for joint in self.joints:
+            if (drive := joint.drive) is not None:
+                keys = drive.model_fields_set | {"name", "joints"}
+                motors.append(Motor.model_construct(keys, **dict(drive), name=joint.name, joints={joint.name: 1.0}))
+        return tuple(motors)

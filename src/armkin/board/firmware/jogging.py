@@ -89,7 +89,7 @@ def jog_motors(
 ) -> None:
     """Move axes at constant rates [counts/s] for a time, then stop; shorter if limits come first.
 
-    goes_on: called every 10 ms; the motion ends when it returns False.
+    Sets the machine's status to that at rest. goes_on: called every 10 ms; the motion ends when it returns False.
     """
     vector = [rate.get(axis, 0) for axis in range(len(machine.configuration.board.axes))]
     port, session = machine.port, machine.session
