@@ -113,16 +113,11 @@ class ServoArm(Backend):
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
         self._read()
-        servos = [
-            {
-                "name": name,
-                "id": number,
-                "torque": bool(self.bus.read(number, self.bus.TORQUE)),
-                **self._servo_report(number),
-                "errors": self._faults(number),
-            }
-            for number, name in zip(self.ids, motor_names(self.arm), strict=True)
-        ]
+        servos = []
+        for number, name in zip(self.ids, motor_names(self.arm), strict=True):
+            torque = bool(self.bus.read(number, self.bus.TORQUE))
+            fields = {"name": name, "id": number, "torque": torque, **self._servo_report(number)}
+            servos.append({**fields, "errors": self._faults(number)})
         return {"firmware": self.firmware, "servos": servos}
 
     # Getting ready

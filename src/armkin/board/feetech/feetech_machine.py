@@ -54,14 +54,12 @@ class ServoMachine(ServoArm):
     def _own_limits(self) -> NDArray[np.int64]:
         """The limits that are stored in the servos: (motors, 2) [counts]."""
         limit_bytes = self.bus.read_all(self.ids, *registers.LIMITS)
-        pairs = [
-            [
-                self._limit_value(registers.MIN_POSITION, limit_bytes[n]),
-                self._limit_value(registers.MAX_POSITION, limit_bytes[n]),
-            ]
-            for n in self.ids
-        ]
-        return np.array([pair if any(pair) else [-_MAX_COUNTS, _MAX_COUNTS] for pair in pairs], dtype=np.int64)
+        limits = []
+        for number in self.ids:
+            lower = self._limit_value(registers.MIN_POSITION, limit_bytes[number])
+            upper = self._limit_value(registers.MAX_POSITION, limit_bytes[number])
+            limits.append([lower, upper] if lower or upper else [-_MAX_COUNTS, _MAX_COUNTS])  # both 0: none
+        return np.array(limits, dtype=np.int64)
 
     @staticmethod
     def _limit_value(register: registers.Register, raw: bytes) -> int:

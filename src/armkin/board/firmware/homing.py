@@ -18,6 +18,7 @@ from armkin.board.firmware import resets_and_stops
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.session import DeviceError
 from armkin.errors import NoHomingError, UsageError
+from armkin.formula.arrays import Array
 from armkin.model.lock_joints import joint_index
 from armkin.model.units import joint_scale
 from armkin.motors import joints, pulses
@@ -111,24 +112,31 @@ def home_joints(
     axes = list(machine.configuration.axes)
     lost_before, lost_steps = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
-    order = {search.joint: i for i, search in enumerate(pending)}
-    for group in sorted(
-        _coupled_groups(arm, list(order)), key=lambda group: min(order.get(j, len(order)) for j in group)
-    ):
+    for group in _groups_in_order(arm, pending):
         for search in (s for s in pending if s.joint in group):
-            announce(arm.joint_names[search.joint])
+            name = arm.joint_names[search.joint]
+            announce(name)
             status, edge = _run_search(machine, search)
-            lost_steps.append(
-                _lost_steps(machine, search, edge, was_known=arm.joint_names[search.joint] not in lost_before)
-            )
+            lost_steps.append(_lost_steps(machine, search, edge, was_known=name not in lost_before))
             overshoot = np.array([status.counts[axis] - edge.counts[axis] for axis in axes])
             q[search.joint] = _switch_value(arm, search.joint) + per_count[search.joint] @ overshoot
-        motors = np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1))
-        machine.vouch(dict(zip([axes[k] for k in motors], pulses(arm, q)[motors].tolist(), strict=True)))
+        _vouch_motors(machine, np.flatnonzero(np.abs(arm.motor_gain[:, group]).sum(axis=1)).tolist(), q)
     if rest_at_home:
-        lost = [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1]
-        machine.vouch(dict(zip([axes[k] for k in lost], pulses(arm, q)[lost].tolist(), strict=True)))
+        _vouch_motors(machine, [k for k, axis in enumerate(axes) if not machine.status.known >> axis & 1], q)
     return lost_steps
+
+
+def _groups_in_order(arm: Arm, pending: Sequence[Search]) -> list[list[int]]:
+    """Groups of the searched joints that home together, by the first search in each."""
+    order = {search.joint: i for i, search in enumerate(pending)}
+    firsts = [(min(order[j] for j in group if j in order), group) for group in _coupled_groups(arm, list(order))]
+    return [group for _, group in sorted(firsts)]
+
+
+def _vouch_motors(machine: FirmwareMachine, motors: Sequence[int], q: Array) -> None:
+    """State to the board that these motors stand where joint values q (n,) have them."""
+    axes = list(machine.configuration.axes)
+    machine.vouch(dict(zip([axes[k] for k in motors], pulses(machine.arm, q)[motors].tolist(), strict=True)))
 
 
 def _lost_steps(machine: FirmwareMachine, search: Search, edge: Status, *, was_known: bool) -> LostSteps:
@@ -170,11 +178,8 @@ def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequ
 
     Returns a function of an input's number and the net steps of all axes since then.
     """
-    joint_of = {
-        configuration.board.switches.index(homing.switch): j
-        for j, homing in enumerate(arm.homing)
-        if homing is not None
-    }
+    switches = configuration.board.switches
+    joint_of = {switches.index(homing.switch): j for j, homing in enumerate(arm.homing) if homing is not None}
     start, axes = pulses(arm, arm.home), list(configuration.axes)
 
     def level(number: int, net: Sequence[int]) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import typer
 
@@ -142,14 +142,24 @@ def path(
         board_link.can_resume(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
         )
+    question = _Question(arm, moves, locked, options)
     if port is None or dry_run:
-        plan = _plan_from(start, "--start", arm, moves, locked, options, json=json)
+        plan = _plan_from(start, "--start", question, json=json)
         answer = _answer(plan, _lay_rehearsal(plan, rehearsal=dry_run))
         _write_files(plan, out, plot)
         _print_answer(plan, answer, json=json, out=out)
         return
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
-    _carry_out_path(arm, moves, locked, options, link, out, plot, json=json)
+    _carry_out_path(question, link, out, plot, json=json)
+
+
+class _Question(NamedTuple):
+    """What is planned."""
+
+    arm: Arm
+    moves: Any  # as `armkin.path` takes them
+    locked: dict[str, float]  # joint name -> value that it is held at [rad | mm]
+    options: dict[str, Any]  # of `armkin.path`, by name
 
 
 def send_path(
@@ -167,50 +177,31 @@ def send_path(
     moves = _moves_of(arm, file, None, None)
     output.check_destination(trace, "a plan is", ".csv")
     options: dict[str, Any] = {"speed": arguments.percent(speed, "--speed")}
+    question = _Question(arm, moves, {}, options)
     if not dry_run:
-        _carry_out_path(arm, moves, {}, options, link, trace, None, json=json)
+        _carry_out_path(question, link, trace, None, json=json)
         return
-    plan = _plan_from(start, "--from", arm, moves, {}, options, json=json)
+    plan = _plan_from(start, "--from", question, json=json)
     answer = {**_answer(plan, _lay_rehearsal(plan)), "dry_run": True}
     _write_files(plan, trace, None)
     _print_answer(plan, answer, json=json, out=trace)
 
 
-def _plan_from(
-    start: str | None,
-    option: str,
-    arm: Arm,
-    moves: Any,
-    locked: dict[str, float],
-    options: dict[str, Any],
-    *,
-    json: bool,
-) -> PathPlan:
+def _plan_from(start: str | None, option: str, question: _Question, *, json: bool) -> PathPlan:
     """Print the plan from the joint values of an option, without motion."""
-    arm = board_link.arm_for_plan(arm)
-    if start is not None:
-        options["start"] = board_link.standing_joints(arm, start, option)
-    return _make_plan(arm, moves, locked, options, json=json)
+    arm = board_link.arm_for_plan(question.arm)
+    begin = {} if start is None else {"start": board_link.standing_joints(arm, start, option)}
+    return _make_plan(question._replace(arm=arm, options=question.options | begin), json=json)
 
 
-def _carry_out_path(
-    arm: Arm,
-    moves: Any,
-    locked: dict[str, float],
-    options: dict[str, Any],
-    link: Link,
-    out: str | None,
-    plot: str | None,
-    *,
-    json: bool,
-) -> None:
+def _carry_out_path(question: _Question, link: Link, out: str | None, plot: str | None, *, json: bool) -> None:
     """Plan from the arm's position, or from the start of a resumed motion, then move."""
     from armkin.board import path_run
     from armkin.board.planner import where_arm_stands
     from armkin.board.stop_signals import planning
     from armkin.motors import joints as joints_of
 
-    arm = board_link.arm_for_port(arm, link.port)
+    arm = board_link.arm_for_port(question.arm, link.port)
     board, stands = board_link.board_of(arm, rehearsal=link.port == SIM), board_link.assumed_joints(arm, link.assume)
     simulated = board_link.simulation_note(link.assume)
     with board_link.open_backend(board, link.port, link.baud, simulated=simulated, reset=link.reset) as machine:
@@ -219,7 +210,8 @@ def _carry_out_path(
         held = board_link.resumed_note(board, link.resume)
         began = machine.counts() if held is None else held.start
         with planning():
-            plan = _make_plan(arm, moves, locked, {**options, "start": joints_of(arm, began)}, json=json)
+            options = question.options | {"start": joints_of(arm, began)}
+            plan = _make_plan(question._replace(arm=arm, options=options), json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
             parts = path_run.lay_parts(plan, began, board.lay)
@@ -274,8 +266,9 @@ def _number_from(text: str, option: str, minimum: float) -> float:
     return value
 
 
-def _make_plan(arm: Arm, moves: Any, locked: dict[str, float], options: dict[str, Any], *, json: bool) -> PathPlan:
+def _make_plan(question: _Question, *, json: bool) -> PathPlan:
     """The plan; of a path that is not carried, what is known of it is printed first."""
+    arm, moves, locked, options = question
     try:
         if locked:
             from armkin.motion.path_planner.held_joints import path_held

@@ -314,13 +314,8 @@ def _arrival_text(arm: Arm, planned: Mapping[str, Any], answer: Mapping[str, Any
     text = board_link.where_text(arm, answer)
     if answer["pulses"] is None:
         return text
-    differences = [
-        f"{name} {count - planned_count:+d} {unit}"
-        for name, unit, planned_count, count in zip(
-            answer["motors"], answer["pulse_units"], planned["pulses"], answer["pulses"], strict=True
-        )
-        if count != planned_count
-    ]
+    motors = zip(answer["motors"], answer["pulse_units"], planned["pulses"], answer["pulses"], strict=True)
+    differences = [f"{name} {count - goal:+d} {unit}" for name, unit, goal, count in motors if count != goal]
     differs = f"not as planned: {', '.join(differences)}" if differences else "as planned"
     return f"{text}read back: {differs}, {answer['duration_s']:.3f} s\n"
 

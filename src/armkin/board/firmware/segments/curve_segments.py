@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -32,6 +32,26 @@ _SETTLING_SHARE = 0.05  # share of the motors' accelerations that removes the ro
 _JUMP_FACTOR = 1.1  # largest factor on the motors' accelerations in a segment
 _CHUNK_SAMPLES = 20_000  # samples evaluated at once
 _BLOCK_SEGMENTS = 512  # segments computed at once
+
+
+class _Part(NamedTuple):
+    """What one segment is for, and the speeds (motors,) [counts/s] of the segments beside it."""
+
+    seconds: float
+    counts: list[float]  # at its end
+    change: float  # relative change of speed, see `Cutter.piece`
+    start_speed: Array  # at the end of the last segment
+    start_time: float  # [s] the longer of the last segment and this one
+    next_speed: Array  # the mean speed of the next segment
+    next_time: float  # [s] the longer of this segment and the next one
+
+    def admits(self, begin: Array, end: Array, max_accel: Array) -> bool:
+        """Whether a ramp from `begin` to `end` (motors,) [counts/s] keeps every motor's acceleration, jumps too."""
+        return bool(
+            (np.abs(begin - self.start_speed) <= max_accel * self.start_time).all()
+            and (np.abs(end - begin) <= max_accel * self.seconds).all()
+            and (np.abs(self.next_speed - end) <= max_accel * self.next_time).all()
+        )
 
 
 @dataclass(frozen=True)
@@ -64,12 +84,17 @@ class CurveSegments:
             longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
             open_end = first + _BLOCK_SEGMENTS < len(bounds) - 1  # the segment behind this block is not known yet
             for i in range(len(t) - 1):
-                segment, last_speed = self._smooth_segment(
-                    cutter, float(seconds[i]), counts[i + 1].tolist(),
-                    0.0 if open_end and i + 2 == len(t) else change[i], last_speed,
-                    max(float(seconds[i]), span), mean[i + 1], float(longer[i])
-                )  # fmt: skip
-                span = float(seconds[i])
+                part = _Part(
+                    seconds=float(seconds[i]),
+                    counts=counts[i + 1].tolist(),
+                    change=0.0 if open_end and i + 2 == len(t) else change[i],
+                    start_speed=last_speed,
+                    start_time=max(float(seconds[i]), span),
+                    next_speed=mean[i + 1],
+                    next_time=float(longer[i]),
+                )
+                segment, last_speed = self._smooth_segment(cutter, part)
+                span = part.seconds
                 yield segment
 
     def _places_at(self, t: Array) -> Array:
@@ -87,27 +112,20 @@ class CurveSegments:
             counts = counts + offset * (1 - f * f * (3 - 2 * f))
         return np.asarray(counts)
 
-    def _smooth_segment(
-        self, cutter: Cutter, seconds: float, counts: list[float], change: float, start_speed: Array, begin_time: float,
-        end_speed: Array, end_time: float,
-    ) -> tuple[Segment, Array]:  # fmt: skip
+    def _smooth_segment(self, cutter: Cutter, part: _Part) -> tuple[Segment, Array]:
         """One segment and the motors' speeds at its end, its ramp reduced as far as the board needs.
 
-        start_speed: speeds at the end of the last segment; end_speed: the mean speed of the next one; begin_time,
-        end_time: the longer time of either pair of segments. A segment without a ramp always fits, since its mean
-        speed follows the last one within the greatest acceleration.
+        A segment without a ramp always fits, since its mean speed follows the last one within the greatest
+        acceleration. Moves the cutter on.
         """
         max_accel = _JUMP_FACTOR * motor_accel(self.arm)
-        state = list(cutter.places), cutter.late
+        places, late = list(cutter.places), cutter.late
         for share in (1.0, 0.75, 0.5, 0.25, 0.0):
-            cutter.places, cutter.late = list(state[0]), state[1]
-            segment = cutter.piece(seconds, counts, change * share)
+            cutter.places, cutter.late = list(places), late
+            segment = cutter.piece(part.seconds, part.counts, part.change * share)
             rate = np.array(segment.rates) * (self.clock / STEP)
             begin, end = rate / segment.interval, rate / segment.last_interval
-            fits = (np.abs(begin - start_speed) <= max_accel * begin_time).all() and (
-                np.abs(end - begin) <= max_accel * seconds
-            ).all()
-            if share == 0.0 or (fits and (np.abs(end_speed - end) <= max_accel * end_time).all()):
+            if share == 0.0 or part.admits(begin, end, max_accel):
                 break
         return segment, end
 
