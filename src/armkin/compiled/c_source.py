@@ -161,7 +161,8 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
         "close_by": CLOSE_BY, "smooth": SMOOTH, "bent": BENT, "wide": REACH, "way": FOLD_WAY,
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "error": ERROR, "high": HIGH,
-        "shrink": local_structure.SHRINK, "moved": MOVED, "same": SAME, "turned": TURNED, "drift": DRIFT,
+        "shrink": local_structure.SHRINK, "bend": local_structure.BEND, "moved": MOVED,
+        "same": SAME, "turned": TURNED, "drift": DRIFT,
         "nearer": local_structure.NEARER, "shorter": local_structure.SHORTER, "longest": local_structure.LONGEST,
         "gain": local_structure.BOTH_WAYS.gain,
     }  # fmt: skip

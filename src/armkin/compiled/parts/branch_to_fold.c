@@ -280,7 +280,7 @@ ARM_SELDOM static int arm_followed(const double *at, int count, int self, const 
 {
     static const double straight[ARM_JOINTS] = {0.0};
     const double whole = out->span, ends = 2.0 * fmax(-out->low, out->high);
-    double grown = 0.0;
+    double grown = 0.0, bend;
     int k, tries, near = ends > 0.0 && 2.0 * ends < whole && out->second > @high@;
     out->span = near ? ends : whole;
     for (tries = 0; tries < @shrinks@ + 2; tries++) {
@@ -295,7 +295,8 @@ ARM_SELDOM static int arm_followed(const double *at, int count, int self, const 
                 grown += fabs(g[k]);
             return (!out->motion || grown > @closed@) && arm_chained(goal, at, count, self, out);
         }
-        out->span = near ? whole : out->span / @shrink@;
+        bend = @bend@ * out->second;
+        out->span = near ? whole : 2.0 * bend < out->span ? bend : out->span / @shrink@;
         near = 0;
     }
     return 0;

@@ -178,21 +178,16 @@ def _merged_branches(pairs: list[Pair], unit: list[float]) -> Truth:
         away: Entry = 0.0
         for (c, s), size in zip(pairs, unit, strict=True):
             for v, scale in ((c, 1.0 / size), (s, 1.0)):
-                if v is not None:
-                    flipped = v
-                    for axis in axes:
-                        flipped = _on_other_branch(flipped, axis)
-                    if flipped is not v:
-                        d = arrays.mul(scale, v - flipped)
-                        away = arrays.add(away, d * d)
+                if v is None or isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4):
+                    continue  # it is one for all branches
+                flipped = v
+                for axis in axes:
+                    flipped = arrays.flip(flipped, axis)
+                d = arrays.mul(scale, v - flipped)
+                away = arrays.add(away, d * d)
         if not isinstance(away, float):
             merged = merged | (away < tol.APART_ROOTS**2)
     return merged
-
-
-def _on_other_branch(v: Entry, axis: int) -> Entry:
-    """What stands on the other branch of an axis; the value itself if it is one for both."""
-    return v if isinstance(v, float) or (isinstance(v, np.ndarray) and v.ndim < 4) else arrays.flip(v, axis)
 
 
 def _adjugate(columns: list[list[Entry]]) -> tuple[list[list[Entry]], Entry]:

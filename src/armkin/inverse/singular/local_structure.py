@@ -23,7 +23,8 @@ from armkin.model.units import radian_or_reach
 NODES = 10  # values of t at which g and x are computed: polynomials of degree 9 are exact to rounding on `span`
 NODE = np.cos(np.pi * (2 * np.arange(NODES) + 1) / (2 * NODES))  # Chebyshev nodes of a span
 ITERATIONS = 8  # Newton steps onto the curve
-SHRINK = 8  # factor by which a span is shortened where a curve turns away within it
+BEND = 8.0  # length of a span, at most, in second smallest singular values, once a longer one did not hold
+SHRINK = 8  # factor by which a span that is shorter still is shortened
 SHRINKS = 3  # times that a span is shortened at most
 SHORTER, LONGEST = 0.35, 2.0  # length of a span relative to the last one, if that does not hold, and at most
 NEARER = 0.5  # share of a span by which what bounds the next one has come nearer
@@ -104,7 +105,9 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, known: newton
         stays = _follow(arm, task, q, target, U, V, w, curve, left, BOTH_WAYS)
         # where two directions are all but lost no shorter span helps; what leaves a span leaves shorter ones
         left = left[~curve.known[left] & (curve.second[left] > tol.HIGH) & (short[left] | ~stays)]
-        curve.span[left] = np.where(short[left], full[left], curve.span[left] / SHRINK)
+        span, bend = curve.span[left], BEND * curve.second[left]
+        shorter = np.where(2.0 * bend < span, bend, span / SHRINK)
+        curve.span[left] = np.where(short[left], full[left], shorter)
         short[left], w[left] = False, 0.0
     return curve
 
@@ -264,19 +267,20 @@ def _nodes(
     on, going = np.zeros(M, bool), np.arange(M)
     before, most = np.zeros(M), span.copy()
     for _ in range(ITERATIONS):
-        at, goal = x[:, going], np.concatenate([target[going]] * NODES)
-        r, J = newton.scaled(arm, task, (q[going] + at * unit).reshape(-1, n), goal)
-        matrix = bordered[:, going]
+        part = going if len(going) < M else slice(None)  # numbers cost copies
+        at, goal = x[:, part], np.concatenate([target[part]] * NODES)
+        r, J = newton.scaled(arm, task, (q[part] + at * unit).reshape(-1, n), goal)
+        matrix = bordered[:, part]
         matrix[:, :, :rows, :n] = J.reshape(NODES, -1, rows, n)
-        ahead = t[:, going] - (v[going] * at).sum(axis=2, keepdims=True)
+        ahead = t[:, part] - (v[part] * at).sum(axis=2, keepdims=True)
         last = newton.nudged(np.linalg.inv, matrix.reshape(-1, rows + 1, rows + 1)).reshape(matrix.shape)
         step = (last @ np.concatenate([r.reshape(NODES, -1, rows), ahead], axis=2)[..., None])[..., 0]
-        x[:, going], along_u[:, going], inverse[:, going] = at + step[:, :, :n], step[:, :, n:], last
+        x[:, part], along_u[:, part], inverse[:, part] = at + step[:, :, :n], step[:, :, n:], last
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # the next step is about as many times smaller than this as this one's square than the last one's
-        done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[going] ** 2)
-        near = (np.abs(x[:, going]).max(axis=2) < 3.0 * np.abs(t[:, going, 0])).all(axis=0) & (size < most[going])
-        on[going], most[going], before[going] = done & near, 0.5 * size, size
+        done = (size < tol.ARRIVED) | (size**3 < tol.ERROR * before[part] ** 2)
+        near = (np.abs(x[:, part]).max(axis=2) < 3.0 * np.abs(t[:, part, 0])).all(axis=0) & (size < most[part])
+        on[part], most[part], before[part] = done & near, 0.5 * size, size
         going = going[~done & near]
         if not len(going):
             break
@@ -314,9 +318,9 @@ TO_LAST = _FIT[-2:]
 
 def _values(coefficients: Array, s: Array) -> Array:
     """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
-    values = np.zeros((*s.shape, coefficients.shape[2]))
+    values, s = np.zeros((*s.shape, coefficients.shape[2])), s[..., None]
     for c in coefficients[::-1]:
-        values *= s[..., None]
+        values *= s
         values += c
     return values
 
