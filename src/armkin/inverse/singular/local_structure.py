@@ -325,12 +325,12 @@ def _values(coefficients: Array, s: Array) -> Array:
     return values
 
 
-def _ends_of_components(g: Array) -> tuple[Array, Bool]:
-    """Where |g| (NODES, M, k) first exceeds `SOLUTION`, as a share of the span, and whether it does, (2, M): below 0
-    and above."""
+def _ends_of_components(g: Array, side: Side) -> tuple[Array, Bool]:
+    """Where |g| (NODES, M, k) first exceeds `SOLUTION` [spans], and whether: (1, M) ahead, or (2, M) both ways."""
     M = g.shape[1]
-    g = np.concatenate([g * ((-1.0) ** EXPONENTS)[:, None, None], g], axis=1)
-    shares, ends = np.ones(2 * M), np.zeros(2 * M, bool)
+    if side.low < 0.0:
+        g = np.concatenate([g * ((-1.0) ** EXPONENTS)[:, None, None], g], axis=1)
+    shares, ends = np.ones(g.shape[1]), np.zeros(g.shape[1], bool)
     # the sum of the coefficients' sizes bounds the polynomial on all of the span
     rows = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > tol.SOLUTION)
     over: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, rows], axes=1), axis=2) > tol.SOLUTION
@@ -345,20 +345,20 @@ def _ends_of_components(g: Array) -> tuple[Array, Bool]:
         first = beyond.argmax(axis=0)
         low, high = between[first, np.arange(len(rows))], between[first + 1, np.arange(len(rows))]
     shares[rows] = low
-    return shares.reshape(2, M), ends.reshape(2, M)
+    return shares.reshape(-1, M), ends.reshape(-1, M)
 
 
 def _decide(curve: Structure, rows: Int, side: Side) -> None:
     """Write what the polynomials of some postures tell: of a component that leaves a shortened span, nothing."""
     g, x, span = curve.g[:, rows], curve.x[:, rows], curve.span[rows]
-    (low, high), (below, above) = _ends_of_components(g)
-    low *= side.low
+    shares, ends = _ends_of_components(g, side)
+    low, high = side.low * shares[0], shares[-1]
     s = low + FINE_GRID * (high - low)  # (points, M)
     way = _values(x, s)
     curve.least[rows], curve.most[rows] = way.min(axis=0), way.max(axis=0)
     extent = curve.most[rows] - curve.least[rows]
     long = extent.max(axis=1) >= tol.REACH
-    curve.known[rows], curve.manifold[rows], short = long | (below & above), long, np.flatnonzero(~long)
+    curve.known[rows], curve.manifold[rows], short = long | ends.all(axis=0), long, np.flatnonzero(~long)
     if len(short):
         slope = _values(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
         steepest = np.linalg.norm(slope, axis=2).argmax(axis=0)
