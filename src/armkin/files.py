@@ -128,6 +128,7 @@ def _is_stream(status: os.stat_result) -> bool:
 
 
 def _check_replaceable(name: str, real: str, status: os.stat_result, *, corrects: bool = False) -> None:
+    """Raise an error where the file is read-only, a robot file, or read by this command."""
     if not status.st_mode & 0o222:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
     if corrects:

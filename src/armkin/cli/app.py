@@ -142,6 +142,7 @@ def run(arguments: list[str]) -> int:
 
 
 def _exit_code(command: Callable[[], Any]) -> int:
+    """Run a command and return its exit code, errors told on stderr."""
     try:
         return int(command() or 0)
     except (KeyboardInterrupt, typer.Abort):

@@ -309,6 +309,7 @@ class _ToFile:
                 self.job.questions.near = about["near"]  # type: ignore[attr-defined]
 
     def _keep_piece(self, finished: Done) -> None:
+        """Count a finished piece and keep its answers: the first in memory, from the second on all on disk."""
         if finished.problem is not None:
             raise finished.problem
         if self.first is None and finished.number == 0 and not self.parts.is_held:
@@ -338,6 +339,7 @@ class _ToFile:
             self.parts.remove()
 
     def _put_parts(self, file: IO[bytes]) -> None:
+        """Write the heading, if the format has one, and the answers of all pieces to a file."""
         if self.parts.is_held:
             headings = (about["heading"] for i in range(self.count) if (about := self.parts.about(i)) is not None)
             heading: list[str] = next((names for names in headings if names), [])

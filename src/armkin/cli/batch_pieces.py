@@ -98,6 +98,7 @@ class Rows:
             first += len(values)
 
     def _of_text(self, source: str) -> Iterator[Piece]:
+        """The pieces of a CSV source, in blocks of lines; the first row with values is read for the heading."""
         learner = Columns(self.names, self.purpose, self.named)  # reads the heading for all later pieces
         number, first = 0, 1
         with csv_to_numbers.open_source(source) as file:

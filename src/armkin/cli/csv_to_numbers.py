@@ -141,6 +141,7 @@ def batch_rows(
 def _all_rows(
     source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None
 ) -> Iterator[Chunk]:
+    """Chunks of all rows of a CSV source; UsageError if there is no row with values."""
     columns = Columns(names, purpose, named)
     first, empty = 1, True
     with open_source(source) as file:

@@ -39,6 +39,7 @@ def arm_summary(answer: Mapping[str, Any]) -> str:
 
 
 def _dh_table(joints: Sequence[dict[str, Any]]) -> str:
+    """Joints with their DH rows, the joint's own variable in its place."""
     rows = [["joint", "alpha/deg", "a/mm", "d/mm", "theta/deg"]]
     for joint in joints:
         dh = joint["dh"]
@@ -60,6 +61,7 @@ def _variable_text(joint: dict[str, Any], constant: float) -> str:
 
 
 def _screw_table(joints: Sequence[dict[str, Any]]) -> str:
+    """Joints with their screws: direction, and a point on the axis or the velocity."""
     rows = [["joint", "w", "v or point q/mm"]]
     for joint in joints:
         screw = joint["screw"]
@@ -85,6 +87,7 @@ def _frames_text(answer: Mapping[str, Any]) -> str:
 
 
 def _ranges_table(answer: Mapping[str, Any]) -> str:
+    """Joints with their limits, home, speeds and homing; without the last column where none homes."""
     rows = [["joint", "limits", "home", "max speed", "max accel", "", "homing"]]
     for joint, unit in zip(answer["joints"], answer["joint_units"], strict=True):
         limits = joint["limits"]
@@ -143,6 +146,7 @@ def _remarks(motor: dict[str, Any]) -> str:
 
 
 def _servos_table(answer: Mapping[str, Any]) -> str:
+    """The servos' travel and pulses; empty where there is none."""
     rows = [["servo", "axis", "travel/deg", "pulse/us", "zero/deg", "us/deg", ""]]
     for motor in answer["motors"]:
         if motor["kind"] == "servo":
@@ -197,6 +201,7 @@ def _hardware_text(answer: Mapping[str, Any]) -> str:
 
 
 def _solver_text(answer: Mapping[str, Any]) -> str:
+    """Reach, task and solver of the arm, or why ik refuses it."""
     lines = [f"  reach    at most {answer['reach_mm']:.4f} mm from the first joint"]
     if answer["task"] is not None:
         pairs = zip(answer["target_labels"], answer["target_units"], strict=True)

@@ -97,6 +97,7 @@ def whole_number(text: str, name: str, low: int, high: int) -> int:
 
 
 def _refusal_reason(number: str, shown: str) -> str:
+    """Why a word is no number, in words: unit, sign, comma or infinity."""
     bare = number.lower().lstrip("+-")
     if not bare:
         return "a number is missing"

@@ -167,6 +167,7 @@ def _json_parts(text: str) -> list[str]:
 
 
 def _parse_answer(text: str) -> dict[str, Any]:
+    """The JSON object of an answer; UsageError if it names no robot file."""
     import json
 
     try:
@@ -181,6 +182,7 @@ def _parse_answer(text: str) -> dict[str, Any]:
 
 
 def _answer_pose(answer: dict[str, Any]) -> Pose:
+    """The pose of an answer: its best branch's joints, or its joints and pulses."""
     if "branches" in answer:
         best = answer.get("best")
         branches = answer["branches"]

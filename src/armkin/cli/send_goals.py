@@ -134,6 +134,7 @@ class Goals:
 
 
 def _checked_goals(arm: Arm, rows: Sequence[int], values: Sequence[Sequence[float]]) -> Goals:
+    """Goals [deg, mm] as joint values within limits; NoSolutionError names the row that is not."""
     from armkin.model.limits import check_limits
 
     joints = units.joints_in(arm, values)

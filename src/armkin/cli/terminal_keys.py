@@ -91,6 +91,7 @@ def keys() -> Iterator[Keys]:
 
 
 def _poll_posix(seconds: float) -> str:
+    """The key pressed within a time [s], "" for none."""
     import select
 
     if not select.select([sys.stdin], [], [], seconds)[0]:
@@ -105,6 +106,7 @@ def _poll_posix(seconds: float) -> str:
 
 
 def _poll_windows(seconds: float) -> str:
+    """The key pressed within a time [s], "" for none."""
     if sys.platform != "win32":
         return ""
     import msvcrt

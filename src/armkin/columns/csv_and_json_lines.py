@@ -53,6 +53,7 @@ def _print_lines(table: Table, between: list[str], quoted: Callable[[Any], str],
 
 
 def _column_texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[str]:
+    """The texts of a column; missing: what stands for nan."""
     if isinstance(column, Words):
         names = [*map(quoted, column.names), missing]
         return [names[i] for i in column.index.tolist()]
@@ -78,6 +79,7 @@ def _import_arrow() -> Any:
 
 
 def _print_by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+    """The rows as bytes, texts joined by Arrow; between: what stands around each column."""
     pieces = [_arrow_texts(pa, column, quoted, missing) for column in table.values()]
     if len(set(between[1:-1])) <= 1 and not between[0]:  # one separator: half as many pieces to join
         lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[1]))

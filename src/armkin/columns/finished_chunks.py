@@ -79,6 +79,7 @@ class Parts:
                 left.unlink()
 
     def _check_job(self) -> None:
+        """Note what is asked, or raise UsageError where the parts on disk belong to another question."""
         place = self.folder / "job.json"
         try:
             before = json.loads(place.read_text("utf-8"))
@@ -145,6 +146,7 @@ class Parts:
         return self.folder / f"{number:08d}"
 
     def _write(self, place: Path, *data: bytes) -> None:
+        """Write a file whole or not at all."""
         aside = Path(f"{place}{_UNFINISHED}")
         try:
             with open(aside, "wb") as file:
@@ -159,6 +161,7 @@ class Parts:
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
+        """Errors of the disk as FileError, with what stays of the parts."""
         try:
             yield
         except OSError as error:

@@ -79,6 +79,7 @@ def _array_head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
 
 
 def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    """Blocks of so many rows of a Parquet file: the columns named (N, k)."""
     pa = parquet.require_pyarrow()
     try:
         file = pa.parquet.ParquetFile(path)
@@ -94,6 +95,7 @@ def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]
 
 
 def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+    """Blocks of so many rows of a JSON Lines file: the columns named (N, k)."""
     chosen: list[str] = []
     try:
         with open(path, encoding="utf-8") as file:

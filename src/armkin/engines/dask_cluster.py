@@ -72,6 +72,7 @@ def _lost_error(client: Any, address: str, error: Exception) -> ClusterError:
 
 
 def _connect(address: str) -> Any:
+    """A client of the scheduler at an address; ClusterError where it cannot be reached."""
     try:
         distributed: Any = import_module("distributed")
     except ImportError:

@@ -78,6 +78,7 @@ def _free_name(name: str, used: tuple[str, ...]) -> str:
 
 
 def _joint_lines(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
+    """The lines of joint i of a URDF between two links, lengths in metres."""
     slides, limited = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
     rotary_kind = "revolute" if limited else "continuous"
     kind = "prismatic" if slides else rotary_kind

@@ -139,6 +139,7 @@ def _interruption_error(reason: str, progress: str) -> LinkError:
 
 
 def _to_boot_drive(image: Image, port: str, tick: Tick) -> FlashResult:
+    """Copy an image to a board's drive; the port on which it then answers."""
     folder = Path(port)
     if not folder.is_dir():
         SerialPort(port, _TO_BOOT_DRIVE).close()

@@ -74,6 +74,7 @@ def read_drawing(name: str, placing: Placing, options: DrawingOptions) -> PathFi
 
 
 def _read_bytes(name: str) -> bytes:
+    """The file's bytes; FileError if it cannot be read or is too large."""
     try:
         with open(name, "rb") as file:
             raw = file.read(MAX_BYTES + 1)

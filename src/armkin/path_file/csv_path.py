@@ -105,6 +105,7 @@ def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str
 
 
 def _row_to_move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
+    """The move of a row: joint values, or a target by a point or a line."""
     named = _numbers_by_column(header, row, line)
     extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < MIN_TOOL_SPEED:

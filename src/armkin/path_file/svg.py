@@ -196,6 +196,7 @@ class _Drawer:
         return True
 
     def _draw_used(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+        """Draw the element that a <use> names; PathFileError if there is none."""
         href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
         if href[:1] != "#" or href[1:] not in named:
             raise self._error(element, f"uses '{href[:40]}', which is not in this file")
@@ -209,6 +210,7 @@ class _Drawer:
             self.draw(child, m, named, depth + 1)
 
     def _draw_stroke(self, element: _Element, stroke: list[Point]) -> None:
+        """Draw a stroke of points [mm], the pen lifted on the way to where it begins."""
         self.points += len(stroke)
         if self.points > MAX_POINTS:
             raise self._error(element, f"is beyond {MAX_POINTS} points: give the drawing in parts")

@@ -144,6 +144,7 @@ def _draw_round(pen: _Outline, attributes: Mapping[str, str], rx: float | None, 
 
 
 def _draw_rectangle(pen: _Outline, attributes: Mapping[str, str]) -> None:
+    """A rectangle with round corners where rx or ry is above 0."""
     x, y = parse_length(attributes.get("x")), parse_length(attributes.get("y"))
     wide, high, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
     w, h = wide or 0.0, high or 0.0

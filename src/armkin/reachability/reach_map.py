@@ -243,6 +243,7 @@ class _Run:
             self.progress(self.cells)
 
     def _write(self, count: int, kept_tables: dict[int, Table]) -> None:
+        """Write all cells to the file that was named, chunk after chunk; what was kept beside it goes."""
         assert self.out is not None
         assert self.parts is not None
         file_format, parts = format_of(self.out), self.parts

@@ -26,7 +26,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,23 +84,34 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # most cells finer than that stay empty
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else side)
     _fill_cells(cells, rng, _UNIFORM, _GROWN, chunk)
+    best = _least_error_level(cells)
+    shape = " x ".join(str(k) for k in best.cells.shape)
+    sweep = "a full turn" if section.closed else "its range"
+    method = (
+        f"{shape} cells of equal area in a section, swept exactly by {arm.joint_names[0]} over {sweep}; "
+        "border cells count half; the error is that half and the change with cells of twice the size"
+    )
+    return Extent(dimensions, best.value, best.error, method)
+
+
+class _Level(NamedTuple):
+    """What cells of one size say of the volume or area, and by how much they may be off."""
+
+    cells: _Cells
+    value: float
+    error: float
+
+
+def _least_error_level(cells: _Cells) -> _Level:
+    """The best of these cells and those of twice, four times, ... the size."""
     levels = [cells]
     while (coarse := levels[-1].merge_cells()) is not None:
         levels.append(coarse)
     brackets = np.array([level.bracket() for level in levels])
     middles = brackets.mean(axis=1)
     errors = 0.5 * np.diff(brackets, axis=1)[:-1, 0] + np.abs(np.diff(middles))
-    chosen = int(np.argmin(errors))
-    cells = levels[chosen]
-    shape = " x ".join(str(k) for k in cells.shape)
-    sweep = "a full turn" if section.closed else "its range"
-    return Extent(
-        dimensions,
-        float(middles[chosen]),
-        float(errors[chosen]),
-        f"{shape} cells of equal area in a section, swept exactly by {arm.joint_names[0]} over {sweep}; "
-        "border cells count half; the error is that half and the change with cells of twice the size",
-    )
+    best = int(np.argmin(errors))
+    return _Level(levels[best], float(middles[best]), float(errors[best]))
 
 
 def tip_freedoms(arm: Arm) -> tuple[Array | None, int]:

@@ -100,6 +100,7 @@ def json_schema() -> dict[str, Any]:
 
 
 def _validate(keys: dict[str, Any]) -> RobotFile:
+    """The keys as a robot file; pydantic's ValidationError lists what is wrong."""
     if not RobotFile.__pydantic_complete__:
         # Looking for pydantic's plugins reads the metadata of every installed package, which takes
         # longer than all the rest of a robot file; nothing here is for them to observe.

@@ -93,6 +93,7 @@ def _check_joint(joint: Joint, convention: str) -> Iterator[Problem]:
 
 
 def _check_range(joint: Joint) -> Iterator[Problem]:
+    """Limits the wrong way round or without room, and a home outside."""
     if joint.limits is None:
         return
     lower, upper = joint.limits
@@ -162,6 +163,7 @@ def _check_homing(joint: Joint) -> Iterator[Problem]:
 
 
 def _check_motors(robot: RobotKeys) -> Iterator[Problem]:
+    """What is wrong with the drives, the motors and the gripper."""
     for i, joint in enumerate(robot.joints):
         if joint.drive is not None:
             for path, message in _check_own_drive(joint, joint.drive, only_drive=robot.motors is None):
@@ -225,6 +227,7 @@ def _check_determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[P
 
 
 def _check_gripper(robot: RobotKeys) -> Iterator[Problem]:
+    """What is wrong with the gripper's drive, ends and travel."""
     gripper = robot.gripper
     assert gripper is not None
     for path, message in check_drive(gripper):
@@ -301,6 +304,7 @@ def _check_board_axis(board: Board | None, foreign: ForeignBoard | None, drive: 
 
 
 def _check_board(robot: RobotKeys, settings: Board) -> Iterator[Problem]:
+    """Settings that the board's kind has not, and inputs that it lacks."""
     if settings.kind not in BOARDS:
         for key in ("driver", "enable", "abort"):
             if getattr(settings, key) is not None:

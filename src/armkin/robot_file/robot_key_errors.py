@@ -144,6 +144,7 @@ def _suggested_keys(errors: list[Any]) -> set[Path]:
 
 
 def _error_text(error: Any) -> str:
+    """One of pydantic's errors in words."""
     kind, path, value = error["type"], error["loc"], error["input"]
     context = error.get("ctx", {})
     if path and path[-1] in ("sign", "direction"):
@@ -219,6 +220,7 @@ def _not_a_choice(value: str, expected: str, shown: str) -> str:
 
 
 def _unknown_key(path: Path) -> str:
+    """What to say of an unknown key: the one that was meant, where it belongs, or the keys there are."""
     key, owner = str(path[-1]), _owner(path)
     near = _suggestion(path)
     if near is not None:
@@ -270,6 +272,7 @@ def _models(path: Path) -> dict[str, type[BaseModel]]:
 
 
 def _example(path: Path) -> str:
+    """What may stand at a key, for example."""
     names = [part for part in path if isinstance(part, str)]
     key = names[-1] if names else ""
     if path and isinstance(path[-1], int):

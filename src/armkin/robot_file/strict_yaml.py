@@ -276,6 +276,7 @@ def _check_mapping(value: Any, lines: dict[Path, int], kind: Kind) -> dict[str, 
 
 
 def _read_key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> str:
+    """A key's text, its line noted; StrictYamlError for merge keys, numbers and keys that stand twice."""
     text = str(event.value)
     if event.implicit[0]:  # plain, without quotes
         if text == "<<":
@@ -294,6 +295,7 @@ def _read_key(event: Any, parent: _Node, lines: dict[Path, int], line: int) -> s
 
 
 def _read_scalar(event: Any, parent: _Node | None, line: int, kind: Kind) -> Any:
+    """The value of a scalar: text in quotes as it is, else a number, a truth or a word."""
     text = str(event.value)
     if not event.implicit[0]:  # the value is in quotes, or a block of text
         _check_text(text, line)
@@ -326,6 +328,7 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
 
 
 def _read_number(text: str, line: int) -> str | int | float:
+    """A plain word as a number, if it is one; StrictYamlError for what may be misread."""
     if re.fullmatch(_INT, text):
         if len(text) > MAX_DIGITS:
             raise StrictYamlError(line, f"{one_line(text)} has more than {MAX_DIGITS} digits; is it a number?")

@@ -70,6 +70,7 @@ class _Reader:
             raise RobotFileError(f"{self.name}: is not a URDF but {other_format}; a URDF begins with <robot name=...>")
 
     def _add_named(self, tag: str, attributes: Mapping[str, str]) -> None:
+        """Note a link or joint by its name, which is unique."""
         name = attributes.get("name")
         if not name:
             raise RobotFileError(f"{self.name}: a <{tag}> has no name")

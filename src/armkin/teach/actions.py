@@ -106,6 +106,7 @@ class Actions:
                 )
 
     def _open(self) -> dict[str, Any]:
+        """What the page needs to begin: scene, last answer, program and board."""
         tab = self.tabs.open()
         self.warm()
         board = None if self.board is None else self.board.thread.state()

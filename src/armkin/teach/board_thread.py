@@ -121,6 +121,7 @@ class BoardThread:
     # The thread that owns the port
 
     def _run_jobs(self) -> None:
+        """The thread's loop: stop, carry out the job that waits, else read the board; closes the link at the end."""
         while not self._ended:
             self._wake.wait(_POLL_PERIOD)
             self._wake.clear()
@@ -136,6 +137,7 @@ class BoardThread:
             self.link.close()
 
     def _carry_out(self, name: str, job: Job) -> None:
+        """Run one job on the board, and publish its start and its end or error."""
         self._doing = name
         self._publish()
         try:

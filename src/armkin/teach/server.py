@@ -114,6 +114,7 @@ class _Handler(BaseHTTPRequestHandler):
             self.close_connection = True
 
     def _serve_get(self) -> None:
+        """Send a file of the page, or the stream of events."""
         path, _, query = self.path.partition("?")
         self.server.guard.check_read(_single_headers(self), page=path == "/")
         if path == "/events":
@@ -128,6 +129,7 @@ class _Handler(BaseHTTPRequestHandler):
         )
 
     def _serve_post(self) -> None:
+        """Carry out an action of the page, and send its answer or error as JSON."""
         headers = _single_headers(self)
         self.server.guard.check_action(headers)
         self.server.accept(self.connection)

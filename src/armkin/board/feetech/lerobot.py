@@ -142,6 +142,7 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
 def _calibrated_motor(
     motors: Mapping[int, Motor], number: int | None, name: str, path: str, counts: int | None
 ) -> Motor:
+    """The motor of a calibrated servo; UsageError where number, name or counts do not fit the file."""
     if number is None or number not in motors:
         has = ", ".join(f"{motor.name} {key}" for key, motor in sorted(motors.items()))
         raise UsageError(f"{path}: joint {name} is servo {number}, which the file has not: it has {has}")

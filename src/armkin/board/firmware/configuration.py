@@ -241,6 +241,7 @@ def _board_accel(accel: float) -> int:
 
 
 def _grip_image(board: Board, gripper: Gripper, grip: Grip) -> AxisImage:
+    """The gripper's axis in the board's configuration; an unused one where it has no rate."""
     if grip.top is None or grip.accel is None:
         return AxisImage()
     low, high = sorted((grip.open, grip.closed))

@@ -185,6 +185,7 @@ def _no_url(name: str, error: Exception) -> str:
 
 
 def _cannot_open(name: str, error: Exception) -> str:
+    """Why a port cannot be opened, and what to do, in words."""
     reason = _error_reason(error)
     match = re.search(r"(?:Errno |\()(\d+)", reason)  # some numbers are only in pyserial's text
     number = getattr(error, "errno", None) or (int(match[1]) if match else None)

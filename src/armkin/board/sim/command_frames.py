@@ -101,6 +101,7 @@ class Commands:
         self._setup.retained = False
 
     def _queue_motion(self, payload: bytes) -> None:
+        """Queue a batch of segments; RefusedError where it does not follow on, or a switch is pressed."""
         batch, queue = read_batch(payload), self._motors.queue
         self._require_state(*_RUNNING, abort=True)
         counts = queue.plan_counts()
@@ -145,6 +146,7 @@ class Commands:
                 raise RefusedError(Error.RATE, i)
 
     def _home(self, payload: bytes) -> None:
+        """Start a switch search; RefusedError for fields out of range or another state."""
         n = len(self._board.axes)
         if len(payload) != 15 + 4 * n:
             raise RefusedError(Error.LENGTH)

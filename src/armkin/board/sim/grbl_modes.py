@@ -176,6 +176,7 @@ class Modes:
             self.tool = [axes.get(k, v) for k, v in enumerate(self.tool)]
 
     def _set_mode(self, code: float) -> None:
+        """Take over one modal G code."""
         if code in _MOTION_CODES:
             self.motion = code
         elif code in (17.0, 18.0, 19.0):

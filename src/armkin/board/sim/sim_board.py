@@ -91,6 +91,7 @@ class SimBoard:
         self._power_up(0 if self.hidden_cause else cause, motors.axes.net, retained)
 
     def _power_up(self, cause: int, net: list[int], retained: _RetainedState | None) -> None:
+        """The board's state after a reset by a cause; what survives it is `retained`."""
         self._splitter = protocol.Splitter(self.board.frame)
         self._error, self._detail = Error.NO_SESSION, 0
         self._next, self._nonce = 0, -1
@@ -160,6 +161,7 @@ class SimBoard:
         self._send(protocol.pack_ack(ack))
 
     def _answer_hello(self, tag: int, version: int, nonce: int) -> None:
+        """Begin a session for a new nonce, and send what the board is."""
         if version != protocol.VERSION:
             self._end_session(Error.VERSION)
         elif nonce != self._nonce:

@@ -147,6 +147,7 @@ class Klipper(SimulatedTime):
         self._out += json.dumps(message).encode() + END
 
     def _status_json(self) -> dict[str, Any]:
+        """The objects that Klipper's API tells the state of."""
         letters = {self.steppers[name].letter: 4 + k for k, name in enumerate(self.axes)}
         return {
             "webhooks": {"state": self.state, "state_message": f"Printer is {self.state}"},
@@ -231,6 +232,7 @@ class Klipper(SimulatedTime):
         """M400 is run when the queue is empty: see `_has_room`."""
 
     def _move(self, words: dict[str, float]) -> None:
+        """Plan a G1 of these words within the steppers' velocities, and count jumps of speed at its start."""
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed
         start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
         end = self._end_places(start, words)
@@ -260,6 +262,7 @@ class Klipper(SimulatedTime):
         return start | {name: base.get(name, 0.0) + value for name, value in goals.items()}
 
     def _run_moves(self, seconds: float) -> None:
+        """Advance the planned moves by a time [s]."""
         while self._moves and seconds > 0.0:
             move = self._moves[0]
             part = min(seconds, move.seconds - move.seconds_done)

@@ -119,6 +119,7 @@ class ServoBus(SimulatedTime):
             self.log.append((self._now, {number: servo.position for number, servo in self.servos.items()}))
 
     def _obey_instruction(self, number: int, kind: int, parameters: bytes) -> None:
+        """Carry out an instruction to one servo or to all, and answer where one does."""
         if number == BROADCAST:
             self._obey_all(kind, parameters)
         elif number in self.servos:

@@ -105,6 +105,7 @@ def _fit_calibration(arm: Arm, rows: Array, kinds: list[str], poses: bool) -> Ca
 
 
 def _file_text(calibration: Calibration, arm: Arm) -> str:
+    """The corrected robot file, with the errors before and after at its top."""
     from armkin.robot_file.robot_file_text import format_robot_file
 
     before, after = calibration.rms("before"), calibration.rms("after")
@@ -116,6 +117,7 @@ def _file_text(calibration: Calibration, arm: Arm) -> str:
 
 
 def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str], json: bool, out: str | None) -> None:
+    """Print the poses to measure next [deg, mm], as CSV or JSON."""
     from armkin.calibration.calibrate_arm import next_poses
     from armkin.columns.csv_cells import csv_line
 

@@ -98,6 +98,7 @@ def _one_chosen(kinds: dict[str, bool]) -> str:
 
 
 def _write_urdf(arm: Arm, out: str | None) -> None:
+    """The arm's URDF, and a note of joints without a speed."""
     import numpy as np
 
     from armkin.export.urdf_writer import urdf_text
@@ -109,6 +110,7 @@ def _write_urdf(arm: Arm, out: str | None) -> None:
 
 
 def _write_table(arm: Arm, convention: str, out: str | None) -> None:
+    """The robot file in another convention, and a note of what its targets then count from."""
     from armkin.export import conventions
     from armkin.robot_file.robot_file_text import format_robot_file
 
@@ -139,6 +141,7 @@ def _write_js(arm: Arm, task: str | None, out: str | None) -> None:
 
 
 def _write_html(arm: Arm, task: str | None, path: str | None, meshes: str | None, out: str | None) -> None:
+    """The arm's page, with a path's plan and meshes where they are named."""
     from armkin.teach.one_file import arm_html
     from armkin.teach.urdf_meshes import meshes_json as read_meshes
 

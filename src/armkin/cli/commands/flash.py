@@ -61,6 +61,7 @@ def _text(answer: dict[str, object]) -> str:
 
 
 def _board_kind(robot: str | None, board: str | None) -> str:
+    """The kind of board, by the robot file or by --board; UsageError where they differ or it is unknown."""
     from armkin.board_catalogue import BOARDS
 
     named = board

@@ -150,6 +150,7 @@ def _text_of(source: str) -> str:
 
 
 def _rows_of_csv(source: str) -> list[dict[str, str]]:
+    """The rows of a CSV by the names of their columns; UsageError for rows of too few or too many cells."""
     lines = [line for line in _text_of(source).splitlines() if line.strip() and not line.lstrip().startswith("#")]
     try:
         rows = [[cell.strip() for cell in row] for row in csv.reader(lines, skipinitialspace=True)]
@@ -235,6 +236,7 @@ def _is_prismatic(cells: Mapping[str, str], row: str, *, d_varies: bool) -> bool
 
 
 def _dh_row(cells: Mapping[str, str], i: int) -> Row:
+    """A row of the table with its joint's kind, limits and home; i: its number, for messages."""
     from armkin.robot_file.new_file import Row
 
     context = f"row {i}: "

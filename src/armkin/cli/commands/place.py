@@ -139,6 +139,7 @@ def _targets(arm: Arm, source: str) -> Array:
 
 
 def _answer(place: Place) -> PlacedRobot:
+    """A robot's best place as data of JSON [mm, deg]."""
     from armkin.model.units import DEGREE
 
     i, j, k = place.best
@@ -166,6 +167,7 @@ def _held_values(place: Place) -> dict[str, float]:
 
 
 def _planned_json(place: Place, plan: PathFromPlace) -> PlannedPlace:
+    """A path planned from one place as data of JSON [mm, deg]."""
     from armkin.model.units import DEGREE
 
     i, j, k = plan.index

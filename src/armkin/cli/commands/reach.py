@@ -70,6 +70,7 @@ def reach(
 
 
 def _answer(reach: Reach) -> Answer:
+    """A map as data of JSON."""
     return {
         **render.head(reach.grid.arm),
         "task": reach.grid.task.name,

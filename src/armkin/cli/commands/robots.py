@@ -30,6 +30,7 @@ def robots(json: Json = False, out: TextOut = None) -> None:
 
 
 def _robot_entry(name: str) -> ShippedRobot:
+    """A shipped robot as data of JSON: its joints, its task and what it can do."""
     from armkin.board.backend.missing_keys import missing_by_command
 
     arm = armkin.load(name)

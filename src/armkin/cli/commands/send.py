@@ -289,6 +289,7 @@ def _all_plans(planner: Planner, goals: Goals | Stream, start: Sequence[int]) ->
 
 
 def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
+    """The plans as CSV, one after another: time [s], joints [deg, mm] and the joints' positions [mm]; None: no file."""
     if path is None:
         return
     names = [*arm.joint_names, "tool"]

@@ -101,6 +101,7 @@ def _servos_text(answer: dict[str, Any]) -> str:
 
 
 def _grbl_text(answer: dict[str, Any]) -> str:
+    """The state of a GRBL board as a table."""
     differences = answer["settings"]
     rows = [
         ["board", f"{answer['board']} on {answer['port']}, {answer['firmware']}"],
@@ -124,6 +125,7 @@ _POWER = {
 
 
 def _firmware_text(answer: dict[str, Any]) -> str:
+    """The state of a board with armkin's firmware as a table."""
     high = [name for name, level in answer["switches"].items() if level]
     low = [name for name, level in answer["switches"].items() if not level]
     switch_word = {True: "on", False: "off"}

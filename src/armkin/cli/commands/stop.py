@@ -78,6 +78,7 @@ def _port_of(port: str | None, baud: int, reset: bool) -> str:
 
 
 def _end_process(process: int, port: str) -> None:
+    """Ask the process that holds a port to stop its arm, and wait until it lets go."""
     import time
 
     from armkin.board.ports import ask_to_stop, holder_pid

@@ -169,6 +169,7 @@ def _answer(survey: Workspace) -> Answer:
 
 
 def _text(answer: Mapping[str, Any]) -> str:
+    """A survey as a table of its ends and measures, and the volume or area."""
     rows = [["", "least", "greatest", ""]]
     for name in ("x", "y", "z", "reach"):
         low, high = answer[f"{name}_mm"]

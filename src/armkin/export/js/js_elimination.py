@@ -66,6 +66,7 @@ def elimination_code(arm: Arm, task: Task, elimination: Elimination) -> str:
 
 
 def _pencil_code(pencil: Pencil) -> str:
+    """One pencil as a JavaScript object."""
     role = pencil.role
     fields = {
         "psi": repr(float(pencil.psi)),

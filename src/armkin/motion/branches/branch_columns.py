@@ -126,6 +126,7 @@ class Samples:
         return parts[0] if len(parts) == 1 else _concatenate(parts)
 
     def _solve_block(self, s: Array, examine: bool) -> Columns:
+        """All branches at samples s (N,), on a singularity those 1e-7 of the length beside it."""
         solutions = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
         q, name, legal = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
         singular = np.flatnonzero(solutions.status == Status.SINGULAR)

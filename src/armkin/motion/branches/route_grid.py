@@ -268,6 +268,7 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
 
 
 def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:
+    """The bound of `interval_deviations` for some intervals (k,); lever: see `levers`."""
     (start, end), (d0, d1), h = path.ends(path.q, intervals), path.ends(path.d, intervals), path.h[intervals]
     d0, d1 = d0 * h, d1 * h
     chord, largest = end - start, np.zeros(len(intervals))

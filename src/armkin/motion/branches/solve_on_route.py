@@ -39,6 +39,7 @@ def correct_to_route(
 
 
 def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
+    """Joint values (N, n) after damped Newton steps from q to targets, each row until its step is negligible."""
     unit = radian_or_reach(arm)
     solved, active, last_size = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
     for _ in range(steps):

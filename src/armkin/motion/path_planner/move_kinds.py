@@ -85,6 +85,7 @@ def _add_spline(walk: Walk, move: Move, value: list[list[float]]) -> None:
 
 
 def _add_offset(walk: Walk, move: Move, value: Any) -> None:
+    """A straight line by a displacement in the base's frame or the tool's."""
     displacement = path_numbers.coordinates(walk.task, value.xyz)
     if value.frame == "tool":
         if walk.task.orientation == "full":

@@ -55,6 +55,7 @@ class _Outline(Walk):
         raise UsageError("a way along the tool's axes hangs on the posture: give place offsets in the frame of targets")
 
     def _plan_group(self) -> None:
+        """Append the targets along the pieces since the last joint move, and begin a new group."""
         if self.goal is not None:
             if self.pieces:
                 route, _ = join_pieces(self.task, self.pieces, self.blends, frozenset(self.pauses), self.pace.tolerance)

@@ -166,16 +166,7 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
     numbers, ends, y, speeds = block
     if len(numbers) == 2:
         return [_line_between(task, spots, numbers, speeds)]
-    moving = (y != y[0]).any(axis=0)  # other components are constant
-    scale, stop = weights(task)[moving], np.isin(np.arange(len(y)), ends)
-    curve: FittedCurves = fit_curves(y[:, moving], FIT_SHARE * tolerance, stop)
-    constant = np.where(moving, 0.0, y[0] / weights(task))
-
-    def curve_at(v: Array) -> tuple[Array, Array]:
-        values, slopes = np.repeat(constant[:, None], len(v), axis=1), np.zeros((len(constant), len(v)))
-        values[moving], slopes[moving] = (component.T / scale[:, None] for component in curve.values(v))
-        return values.T, slopes.T
-
+    curve, curve_at = _fit_moving(task, y, np.isin(np.arange(len(y)), ends), tolerance)
     piece, length = unit_speed_piece(task, spots.spot(numbers[0]), curve_at, curve.begin)
     passed, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
     changes = _speed_changes(speeds)
@@ -199,6 +190,25 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
         first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
         pieces.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
     return pieces
+
+
+def _fit_moving(
+    task: Task, y: Array, stop: Bool, tolerance: float
+) -> tuple[FittedCurves, Callable[[Array], tuple[Array, Array]]]:
+    """The curve through the components of y (N, d) [mm] that are not constant; and points and slopes of all of them.
+
+    stop: (N,) where the path rests.
+    """
+    moving = (y != y[0]).any(axis=0)
+    scale, constant = weights(task)[moving], np.where(moving, 0.0, y[0] / weights(task))
+    curve: FittedCurves = fit_curves(y[:, moving], FIT_SHARE * tolerance, stop)
+
+    def curve_at(v: Array) -> tuple[Array, Array]:
+        values, slopes = np.repeat(constant[:, None], len(v), axis=1), np.zeros((len(constant), len(v)))
+        values[moving], slopes[moving] = (component.T / scale[:, None] for component in curve.values(v))
+        return values.T, slopes.T
+
+    return curve, curve_at
 
 
 def _speed_changes(speeds: Array) -> Bool:

@@ -86,6 +86,7 @@ class Cut(StartedTrajectory):
         return isinstance(stretch, Straight) and stretch.law.is_trapezoid and bool((start != end).any())
 
     def _move_of(self, stretch: Stretch, start: Counts, end: Counts, pieces: Pieces) -> Move:
+        """The segments of one stretch, straight or curved, between counts."""
         if self._is_line(stretch, start, end):
             a, b, interval = start.tolist(), end.tolist(), self.min_interval
             return line_segments(a, b, stretch.law, clock=self.clock, min_interval=interval, pieces=pieces)
@@ -168,6 +169,7 @@ def _greatest_rates(arm: Arm, stretch: Stretch, start: Counts, end: Counts) -> A
 
 
 def _too_fast(arm: Arm, stretch: Stretch, rates: Array, allowed: float) -> RateError:
+    """The error of rates (motors,) [counts/s] above what is allowed: which joint and motor ask for it."""
     k = int(rates.argmax())
     speeds = stretch.top_speed
     joint = int(np.argmax(np.abs(arm.motor_gain[k]) * speeds))

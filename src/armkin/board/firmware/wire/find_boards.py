@@ -31,6 +31,7 @@ def foreign_ports() -> Iterable[str]:
 
 
 def _board_answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
+    """Whether a board with armkin's firmware, of a kind's number or any, answers on a port."""
     try:
         link = SerialPort(name, baud, reset=reset)
     except LinkError:

@@ -119,6 +119,7 @@ class Window:
         return self._free - sum(frame.segments for frame, _ in self._sent)
 
     def _fill(self) -> None:
+        """Send waiting frames as far as the board's credit, the window and its receive buffer have room."""
         credit = self._credit
         size = sum(len(frame_bytes) for _, frame_bytes in self._sent)
         max_frames = _UNDER_WAY[0 if self._line.noisy else 1]
