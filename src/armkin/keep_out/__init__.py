@@ -1,13 +1,13 @@
-"""Where an arm must not go: its bodies, what stands around it, how far apart they are, and proofs of motions.
+"""Keep-outs: the bodies of an arm, the obstacles around it, their distances, and proofs that motions hit nothing.
 
-load_with_scene.py      `armkin.load`: a robot, its scene, and a check that some posture is free
+load_with_scene.py      `armkin.load`: reads a robot and its scene, and checks that some posture is free
 bodies.py               the arm's bodies: capsules along its skeleton
-shapes/                 what stands around it: one file a shape
-body_pairs.py           which pairs count, and how far apart each is in a posture
-clearance.py            `armkin.clearance`, and hits in words
-displacement_bounds.py  how far a body moves when joints do; motion_geometry.py: a motion as its geometry alone
-motion_proof.py         a motion proved free between its samples
-keep_out_json.py        what `armkin info` tells
+shapes/                 obstacles, one file for each shape
+body_pairs.py           the pairs that may collide, and their distances in a posture
+clearance.py            `armkin.clearance`, and texts about hits
+displacement_bounds.py  bounds of a body's displacement; motion_geometry.py: the geometry of a motion without its time
+motion_proof.py         proves that a motion hits nothing, also between samples
+keep_out_json.py        the fields of `armkin info`
 
-Nothing here knows boards. An arm without keep-outs comes no farther than `load_with_scene`.
+No module here depends on boards. For an arm without keep-outs only `load_with_scene` runs.
 """

@@ -1,7 +1,7 @@
-"""The bodies of an arm: capsules along its skeleton, one body a joint, and one for what stands before joint 1.
+"""The bodies of an arm: capsules along its skeleton, one body for each joint and one for the base.
 
-Body 0 is the base's, body i the one that joint i moves. A segment's ends are constant in the frame after its
-joint's motion; a slide's own segment begins where the body before ends, so it is as long as the slide is out.
+Body 0 is the base, and joint i moves body i. The ends of a segment are constant in the frame after the joint's motion.
+The first segment of a prismatic joint begins at the end of the previous body, so that it grows with the joint value.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
     _Segment = tuple[int, Array, Array, bool]  # body, begin, end, and whether it slides out
 
 BASE = "base"  # name of the base's body
-ASSUMED = 0.02  # radius, as a share of the reach, of a body that the file does not state
+ASSUMED = 0.02  # radius, as a share of the reach, of a body without a radius in the file
 
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
     """Capsules of one arm, lengths in mm; their segments are in the order of the bodies.
 
-    segment i goes from begin[i] to end[i] in the frame after joint owner[i]'s motion (0: in the world); where
-    slide[i], begin[i] is a place in the frame before that motion.
+    Segment i goes from begin[i] to end[i] in the frame after the motion of joint owner[i] (0: in the world). If
+    slide[i], begin[i] is a point in the frame before that motion.
     """
 
     names: tuple[str, ...]  # (n + 1,) base first
     radius: Array  # (n + 1,)
-    assumed: NDArray[np.bool_]  # (n + 1,) the file does not state it
+    assumed: NDArray[np.bool_]  # (n + 1,) whether the file has no radius
     owner: NDArray[np.intp]  # (S,) body of each segment
     begin: Array  # (S, 3)
     end: Array  # (S, 3)
@@ -55,7 +55,7 @@ class Bodies:
 
 @lru_cache(maxsize=64)
 def bodies(arm: Arm) -> Bodies:
-    """The bodies of an arm that has keep-outs, or of any other with radii assumed.
+    """The bodies of an arm; radii that the file does not state are assumed.
 
     >>> import armkin
     >>> found = bodies(armkin.load("three_dof"))
@@ -79,36 +79,36 @@ def bodies(arm: Arm) -> Bodies:
 
 
 def _base_segments(arm: Arm) -> list[_Segment]:
-    """The base's segments, with those of link 1 that lie on joint 1's own axis: they do not turn."""
-    form, least = arm_shape(arm), 1e-9 * arm.reach
-    still = list(_segments_between(form.bodies[0], least))
+    """The segments of the base, and those of link 1 on the axis of joint 1, which do not move."""
+    skeleton, min_length = arm_shape(arm), 1e-9 * arm.reach
+    fixed_segments = list(_segments_between(skeleton.bodies[0], min_length))
     if not arm.prismatic[0]:
-        on_axis = [s for s in _segments_between(form.bodies[1], least) if _on_axis(s, least)]
-        still += [(_place_point(arm.link[0], a), _place_point(arm.link[0], b)) for a, b in on_axis]
-    return [(0, a, b, False) for a, b in still or [(form.bodies[0][-1],) * 2]]
+        axis_segments = [s for s in _segments_between(skeleton.bodies[1], min_length) if _on_axis(s, min_length)]
+        fixed_segments += [(_place_point(arm.link[0], a), _place_point(arm.link[0], b)) for a, b in axis_segments]
+    return [(0, a, b, False) for a, b in fixed_segments or [(skeleton.bodies[0][-1],) * 2]]
 
 
-def _link_segments(arm: Arm, i: int) -> list[_Segment]:
-    """The segments that move with joint i; of a slide the first one, which grows, as well."""
-    corners, least = arm_shape(arm).bodies[i + 1], 1e-9 * arm.reach
-    segments = list(_segments_between(corners, least))
-    if arm.prismatic[i]:
-        return [(i + 1, corners[0], corners[0], True), *((i + 1, a, b, False) for a, b in segments)]
-    if i == 0:
-        segments = [s for s in segments if not _on_axis(s, least)]
+def _link_segments(arm: Arm, joint: int) -> list[_Segment]:
+    """The segments that move with a joint, among them the growing one of a prismatic joint."""
+    corners, min_length = arm_shape(arm).bodies[joint + 1], 1e-9 * arm.reach
+    segments = list(_segments_between(corners, min_length))
+    if arm.prismatic[joint]:
+        return [(joint + 1, corners[0], corners[0], True), *((joint + 1, a, b, False) for a, b in segments)]
+    if joint == 0:
+        segments = [s for s in segments if not _on_axis(s, min_length)]
     elif not segments:
         segments = [(corners[-1], corners[-1])]  # a body without length is a sphere
-    return [(i + 1, a, b, False) for a, b in segments]
+    return [(joint + 1, a, b, False) for a, b in segments]
 
 
-def _segments_between(corners: Array, least: float) -> list[tuple[Array, Array]]:
-    """Neighbouring corners that are apart."""
+def _segments_between(corners: Array, min_length: float) -> list[tuple[Array, Array]]:
+    """Pairs of neighbouring corners at different points."""
     pairs = pairwise(corners)
-    return [(a, b) for a, b in pairs if np.linalg.norm(b - a) > least]
+    return [(a, b) for a, b in pairs if np.linalg.norm(b - a) > min_length]
 
 
-def _on_axis(segment: tuple[Array, Array], least: float) -> bool:
-    return all(float(np.hypot(*point[:2])) <= least for point in segment)
+def _on_axis(segment: tuple[Array, Array], tolerance: float) -> bool:
+    return all(float(np.hypot(*point[:2])) <= tolerance for point in segment)
 
 
 def _place_point(T: Array, point: Array) -> Array:
@@ -117,13 +117,13 @@ def _place_point(T: Array, point: Array) -> Array:
 
 def segment_ends(arm: Arm, q: Array) -> tuple[Array, Array]:
     """Both ends of every segment: q (N, n) [rad | mm] -> (3, S, N) twice, in the world."""
-    form = bodies(arm)
-    ends_of_segments = np.empty((2, 3, len(form.owner), len(q)))
+    arm_bodies = bodies(arm)
+    ends_of_segments = np.empty((2, 3, len(arm_bodies.owner), len(q)))
     columns = list(np.ascontiguousarray(q.T))
     code = _recorded_ends(arm).get(len(q))
     entries = ends_formula(arm, columns) if code is None else code.run(columns, code.workspace(len(q)))
-    for k, entry in enumerate(entries):
-        segment, coordinate = divmod(k, 6)
+    for number, entry in enumerate(entries):
+        segment, coordinate = divmod(number, 6)
         ends_of_segments[coordinate // 3, coordinate % 3, segment] = entry
     return ends_of_segments[0], ends_of_segments[1]
 
@@ -134,16 +134,16 @@ def _recorded_ends(arm: Arm) -> LazyCode:
 
 
 def ends_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
-    """Six numbers a segment: where it begins and where it ends."""
-    form = bodies(arm)
+    """The coordinates of both ends of each segment, six numbers for each."""
+    capsules = bodies(arm)
     entries: list[Entry] = []
-    for k in np.flatnonzero(form.owner == 0):
-        entries += [*map(float, form.begin[k]), *map(float, form.end[k])]
+    for row in np.flatnonzero(capsules.owner == 0):
+        entries += [*map(float, capsules.begin[row]), *map(float, capsules.end[row])]
     P = pose.constant(arm.link[0])
-    for i in range(arm.n):
-        before, P = P, move(arm, P, i, q[i])
-        for k in np.flatnonzero(form.owner == i + 1):
-            entries += pose.apply(before if form.slide[k] else P, [float(x) for x in form.begin[k]])
-            entries += pose.apply(P, [float(x) for x in form.end[k]])
-        P = pose.compose(P, pose.constant(arm.link[i + 1]))
+    for joint in range(arm.n):
+        previous, P = P, move(arm, P, joint, q[joint])
+        for row in np.flatnonzero(capsules.owner == joint + 1):
+            entries += pose.apply(previous if capsules.slide[row] else P, [float(x) for x in capsules.begin[row]])
+            entries += pose.apply(P, [float(x) for x in capsules.end[row]])
+        P = pose.compose(P, pose.constant(arm.link[joint + 1]))
     return entries

@@ -1,4 +1,4 @@
-"""`armkin.clearance`: how far an arm is from the nearest thing that it must not touch, and hits in words."""
+"""`armkin.clearance`: the distance of an arm from the nearest obstacle or body, and texts about hits."""
 
 from __future__ import annotations
 
@@ -56,61 +56,66 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
     (np.float64(-47.505), 'q3', 'table')
     """
     values = as_joints(arm, q)
-    full_arm, full = whole_arm(arm, values.reshape(-1, arm.n))
-    lead = values.shape[:-1]
+    full_arm, full_q = whole_arm(arm, values.reshape(-1, arm.n))
+    batch_shape = values.shape[:-1]
     if not full_arm.keep_out:
-        nothing = np.full(lead, "", dtype="<U1")
-        return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], nothing[()], nothing[()])
-    held = _guard(full_arm)
-    mm, pairs = held.least_clearances(full)
-    return name_clearances(full_arm, mm, pairs, lead)
+        no_name = np.full(batch_shape, "", dtype="<U1")
+        return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], no_name[()], no_name[()])
+    arm_guard = _guard(full_arm)
+    mm, pairs = arm_guard.least_clearances(full_q)
+    return name_clearances(full_arm, mm, pairs, batch_shape)
 
 
 def name_clearances(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
-    """Clearances (N,) of pairs (N,) with their names, in the shape of a batch."""
+    """Clearances (N,) and the names of their pairs (N,), in the shape of a batch."""
     held = _guard(arm)
     bodies, partners = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
     return Clearance(mm.reshape(lead)[()], bodies[pairs].reshape(lead)[()], partners[pairs].reshape(lead)[()])
 
 
 def least_clearances(arm: Arm, q: Array) -> Array:
-    """Least clearances and the numbers of their pairs of an arm with keep-outs: q (N, n) -> (N, 2)."""
+    """Least clearances and the indices of their pairs, for an arm with keep-outs: q (N, n) -> (N, 2)."""
     return np.stack(_guard(arm).least_clearances(q), axis=1)
 
 
 def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
-    """The arm whose joints `armkin.lock` held, and its joint values: q (N, n)."""
+    """The arm before `armkin.lock`, with all its joints, and its joint values: q (N, n)."""
     while arm.whole is not None:
-        arm, held = arm.whole
-        q = unlock(arm, held, q)
+        arm, locked_values = arm.whole
+        q = unlock(arm, locked_values, q)
     return arm, q
 
 
 def hits_nothing(arm: Arm, q: Array) -> NDArray[np.bool_]:
-    """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); a row of nan is none."""
-    full_arm, full = whole_arm(arm, q.reshape(-1, arm.n))
-    free: NDArray[np.bool_] = np.asarray(np.isfinite(full).all(axis=1))
+    """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); False for rows with nan."""
+    full_arm, full_q = whole_arm(arm, q.reshape(-1, arm.n))
+    free: NDArray[np.bool_] = np.asarray(np.isfinite(full_q).all(axis=1))
     if full_arm.keep_out:
-        free[free] = _guard(full_arm).least_clearances(full[free])[0] >= 0.0
+        free[free] = _guard(full_arm).least_clearances(full_q[free])[0] >= 0.0
     return free.reshape(q.shape[:-1])
 
 
 def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
-    """The least clearance [mm] of each posture (N, n) (None: nothing counts) and its hits, the deepest first."""
-    full_arm, full = whole_arm(arm, q)
-    held = _guard(full_arm)
+    """The least clearance [mm] of each posture (N, n) (None without pairs) and its hits, the deepest first."""
+    full_arm, full_q = whole_arm(arm, q)
+    arm_guard = _guard(full_arm)
     answers = []
-    for row in held.clearances(full):
-        deep = [k for k in np.argsort(row, kind="stable") if row[k] < 0]
-        hit: list[Hit] = [
-            {"body": held.pair_names(k)[0], "with": held.pair_names(k)[1], "depth_mm": float(-row[k])} for k in deep
+    for clearances in arm_guard.clearances(full_q):
+        hit_pairs = [pair for pair in np.argsort(clearances, kind="stable") if clearances[pair] < 0]
+        posture_hits: list[Hit] = [
+            {
+                "body": arm_guard.pair_names(pair)[0],
+                "with": arm_guard.pair_names(pair)[1],
+                "depth_mm": float(-clearances[pair]),
+            }
+            for pair in hit_pairs
         ]
-        answers.append((float(row.min()) if len(row) else None, hit))
+        answers.append((float(clearances.min()) if len(clearances) else None, posture_hits))
     return answers
 
 
 def hits_text(hits: list[Hit]) -> str:
-    """Hits in words.
+    """A text about hits.
 
     >>> hits_text([{"body": "q3", "with": "table", "depth_mm": 12.345}])
     'hits table by 12.3 mm (q3)'
@@ -124,16 +129,20 @@ def _size_text(mm: float) -> str:
 
 
 def assumed_radii(arm: Arm) -> list[tuple[str, float]]:
-    """Bodies whose radius no file states, and the radius [mm] that is taken: none for an arm without keep-outs."""
+    """Names of bodies without a stated radius, and the assumed one [mm]; empty for an arm without keep-outs."""
     full_arm = whole_arm(arm, np.empty((0, arm.n)))[0]
     if not full_arm.keep_out:
         return []
-    form = _guard(full_arm).bodies
-    return [(name, float(r)) for name, r, taken in zip(form.names, form.radius, form.assumed, strict=True) if taken]
+    arm_bodies = _guard(full_arm).bodies
+    return [
+        (name, float(radius))
+        for name, radius, is_assumed in zip(arm_bodies.names, arm_bodies.radius, arm_bodies.assumed, strict=True)
+        if is_assumed
+    ]
 
 
 def _guard(arm: Arm) -> Guard:
-    """The pairs of an arm with keep-outs; what they need is imported for such arms alone."""
+    """The pairs of an arm with keep-outs; the import is local, as other arms do not need it."""
     from armkin.keep_out.body_pairs import guard
 
     return guard(arm)

@@ -17,27 +17,31 @@ if TYPE_CHECKING:
 
 
 def keep_out_fields(arm: Arm) -> dict[str, Any]:
-    """Bodies with their segments in the frames that they move with, pairs left out, hits at home."""
-    held = guard(arm)
-    form = held.bodies
+    """Bodies with their segments in the frames that they move with, ignored pairs, and hits at home."""
+    arm_guard = guard(arm)
+    arm_bodies = arm_guard.bodies
     home = arm.home[None]
-    placed, begin, end = frames(arm, home)[0], *segment_ends(arm, home)
+    poses, begin, end = frames(arm, home)[0], *segment_ends(arm, home)
     bodies = []
-    for k, name in enumerate(form.names):
-        T = placed[k]  # base, then every joint's frame
+    for body, name in enumerate(arm_bodies.names):
+        T = poses[body]  # the base's frame, then the joints'
         segments: list[dict[str, Any]] = []
-        for s in np.flatnonzero(form.owner == k):
-            ends_in_frame = [(T[:3, :3].T @ (point[:, s, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
+        for segment in np.flatnonzero(arm_bodies.owner == body):
+            ends_in_frame = [(T[:3, :3].T @ (point[:, segment, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
             segments.append(
-                {"from": ends_in_frame[0], "to": ends_in_frame[1], **({"slide": True} if form.slide[s] else {})}
+                {
+                    "from": ends_in_frame[0],
+                    "to": ends_in_frame[1],
+                    **({"slide": True} if arm_bodies.slide[segment] else {}),
+                }
             )
-        radius, assumed = float(form.radius[k]), bool(form.assumed[k])
+        radius, assumed = float(arm_bodies.radius[body]), bool(arm_bodies.assumed[body])
         bodies.append({"name": name, "radius_mm": radius, "assumed": assumed, "segments": segments})
-    [(_, at_home)] = hits(arm, home)
+    [(_, hits_at_home)] = hits(arm, home)
     return {
         "clearance_mm": arm.clearance,
         "keep_out": keep_out_names(arm.keep_out),
         "bodies": bodies,
-        "pairs_left_out": [list(pair) for pair in held.left_out],
-        "hits_at_home": at_home,
+        "pairs_left_out": [list(pair) for pair in arm_guard.left_out],
+        "hits_at_home": hits_at_home,
     }

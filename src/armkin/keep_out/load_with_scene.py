@@ -39,12 +39,12 @@ def load(
     """
     from armkin import robot_file
 
-    file, around = robot_file.read_robot_file(path), None
+    file, keep_out_scene = robot_file.read_robot_file(path), None
     if scene is not None:
         from armkin.robot_file.scene_file import read_scene
 
-        around = read_scene(scene)
-    return arm_in_scene(file, around, tool)
+        keep_out_scene = read_scene(scene)
+    return arm_in_scene(file, keep_out_scene, tool)
 
 
 def arm_in_scene(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:

@@ -1,23 +1,25 @@
-"""What an arm's tip can reach: samples, bounds, volume, and the cloud as a file.
+"""Reachable positions and orientations of an arm, and the best place for an arm.
 
-sampling.py          joint values: random or a grid
-dexterity.py         manipulability and step error at a pose
-volume.py            volume or area, with its error
-cloud_file.py        .csv, .npz, .ply
-workspace_survey.py  `workspace`: all of it in one pass of bounded memory
+The workspace of the tip, from samples of the joint values:
 
-Where, with which orientations, by how many branches:
+sampling.py          joint values, random or on a grid
+dexterity.py         manipulability and step error of a posture
+volume.py            volume or area of the workspace, with an error
+cloud_file.py        the samples as a .csv, .npz or .ply file
+workspace_survey.py  `workspace`: all of this in one pass with bounded memory
 
-reach_cells.py     rings of cells about joint 1's axis, and the orientations in each
-cell_answers.py    what a ring is answered: by arcs of joint 1 and the last joint, or pose by pose
-voxels.py          cubic voxels of the cells, for pictures
-reach_map.py       `reach`: all rings, in chunks, by any engine
-place_search.py    `place`: where to put an arm for given targets or a path; place_file.py: its columns
-place_targets.py   what an arm reaches from a place; place_arm.py: the arm there, among what stands with the targets
-place_upright.py   places of an arm whose joint 1 stands upright beside the base's axis: by the distance from it alone
-best_place.py      which of the places is best: by targets, margin, distance to joint limits
-place_branches.py  which branches carry a way of the tool from a place; place_path.py: its plan from the best ones
-kept_chunks.py     chunks of both, answered by an engine and kept beside a file
+Reachable orientations and numbers of branches in a grid of cells, and placing an arm:
+
+reach_cells.py     rings of cells about the axis of joint 1, and the orientations in each cell
+cell_answers.py    results of a ring of cells, from arcs of joint 1 and the last joint, or from each pose
+voxels.py          cubic voxels for pictures of the cells
+reach_map.py       `reach`: all rings, in chunks, on any engine
+place_search.py    `place`: the best place of an arm for targets or a path; place_file.py: its file
+place_targets.py   targets that an arm reaches from a place; place_arm.py: the arm at a place, with obstacles
+place_upright.py   arms with a vertical joint 1 off the base's axis: answers by the distance from that joint
+best_place.py      the choice of the best place: by targets, margin, distance to joint limits
+place_branches.py  branches that follow a path from a place; place_path.py: plans from the best places
+kept_chunks.py     results of chunks, kept beside the file so that a run can be resumed
 """
 
 from armkin.reachability.workspace_survey import Workspace, workspace

@@ -1,4 +1,4 @@
-"""The best of many places: it reaches most, by the greatest margin, then by the greatest distance to a joint limit."""
+"""Chooses the best place: most targets reached, then greatest margin, then greatest distance to joint limits."""
 
 from __future__ import annotations
 
@@ -12,44 +12,44 @@ from armkin.formula.arrays import Array
 from armkin.reachability.cell_answers import limit_margin
 from armkin.reachability.place_targets import PlaceQuestion, at_value, free_from
 
-Room = Callable[[int, int, int], float]  # of a place by its index: how far its joints stay from limits, as a share
+Room = Callable[[int, int, int], float]  # index of a place -> distance of its joints to limits, as a share of the range
 
 
 def margins(good: NDArray[np.bool_], step: float) -> Array:
-    """Distance of each place (X, Y, K) to the nearest one, at the same yaw, that is not good; 0 for these."""
+    """Distance of each good place (X, Y, K) to the nearest place of the same yaw that is not good; else 0."""
     X, _, K = good.shape
     distances = np.zeros(good.shape)
     columns = np.arange(X)[:, None]
-    for k in range(K):
-        if not good[:, :, k].any():
+    for yaw in range(K):
+        if not good[:, :, yaw].any():
             continue
-        # along y, then across x: the lower envelope of parabolas, here tried row by row
-        rows = _depth_along_y(good[:, :, k])
-        distances[:, :, k] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
+        # distance transform, first along y, then along x, where each row gives a parabola
+        rows = _depth_along_y(good[:, :, yaw])
+        distances[:, :, yaw] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
     return distances
 
 
 def _depth_along_y(good: NDArray[np.bool_]) -> Array:
-    """How many places along y it is to the nearest one that is not good: (X, Y)."""
+    """Number of steps along y to the nearest place that is not good: (X, Y)."""
     index = np.where(good, np.inf, np.arange(good.shape[1]))
-    ahead = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(good.shape[1])
-    behind = np.arange(good.shape[1]) - np.maximum.accumulate(np.where(good, -np.inf, index), axis=1)
-    return np.asarray(np.minimum(ahead, behind))
+    steps_up = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(good.shape[1])
+    steps_down = np.arange(good.shape[1]) - np.maximum.accumulate(np.where(good, -np.inf, index), axis=1)
+    return np.asarray(np.minimum(steps_up, steps_down))
 
 
 def best_place(room: Room, reached: NDArray[np.int64], margin: Array) -> tuple[int, int, int]:
-    """The place that reaches most, by the greatest margin, then by the greatest distance to a joint limit."""
-    most = reached == reached.max()
-    tied = np.argwhere(most & (margin >= margin[most].max() - 1e-9))
-    if len(tied) > 1 and reached.max():
-        spread = tied[:: max(len(tied) // 200, 1)]  # some of very many alike are enough
-        tied = spread[int(np.argmax([room(*index) for index in spread.tolist()])) :]
-    i, j, k = tied[0].tolist()
+    """The place with most targets reached, then greatest margin, then greatest distance to joint limits."""
+    is_best = reached == reached.max()
+    candidates = np.argwhere(is_best & (margin >= margin[is_best].max() - 1e-9))
+    if len(candidates) > 1 and reached.max():
+        sample = candidates[:: max(len(candidates) // 200, 1)]  # a sample of very many equal places is enough
+        candidates = sample[int(np.argmax([room(*index) for index in sample.tolist()])) :]
+    i, j, k = candidates[0].tolist()
     return i, j, k
 
 
 def limit_rooms(question: PlaceQuestion, x: Array, y: Array, yaws: Array) -> Room:
-    """`_limit_room` of places by their index, each asked once."""
+    """`_limit_room` of places by their index, cached."""
 
     @cache
     def room(i: int, j: int, k: int) -> float:
@@ -58,10 +58,10 @@ def limit_rooms(question: PlaceQuestion, x: Array, y: Array, yaws: Array) -> Roo
     return room
 
 
-def _limit_room(question: PlaceQuestion, position: Array, turn: float) -> float:
-    """The least, over the targets reached, of the best branch's distance to a limit, as a share of the range."""
-    question = at_value(question, position, turn)
-    s, legal = free_from(question, position, turn)
-    margins = np.where(legal, limit_margin(question.arm, s.q), -np.inf).max(axis=1, initial=-np.inf)
+def _limit_room(question: PlaceQuestion, position: Array, yaw: float) -> float:
+    """Least distance to a joint limit over the reached targets, each on its best branch, as a share of the range."""
+    question = at_value(question, position, yaw)
+    solutions, legal = free_from(question, position, yaw)
+    margins = np.where(legal, limit_margin(question.arm, solutions.q), -np.inf).max(axis=1, initial=-np.inf)
     reached_margins = margins[np.isfinite(margins)]
     return float(reached_margins.min()) if len(reached_margins) else 0.0

@@ -1,7 +1,7 @@
-"""A cloud of samples as a file, written chunk by chunk, whole or not at all.
+"""Writes a cloud of samples to a file chunk by chunk; after an error there is no file.
 
-.csv  one row a sample: joints [deg | mm], x, y, z [mm], the measures asked for; ten digits, nine decimals
-.npz  arrays of doubles: joints (N, n) [deg | mm], position (N, 3) [mm], one array a measure; joint_names
+.csv  one row for each sample: joints [deg | mm], x, y, z [mm], measures; ten digits, at most nine decimals
+.npz  arrays of doubles: joints (N, n) [deg | mm], position (N, 3) [mm], an array for each measure; joint_names
 .ply  a point cloud for MeshLab, CloudCompare, Blender: x, y, z and the measures as floats
 """
 
@@ -31,7 +31,7 @@ _ENDS = (".csv", ".npz", ".ply")
 
 
 def check_cloud(path: str) -> str:
-    """The kind of cloud that a file's name asks for."""
+    """The ending of a cloud's file; raises UsageError for another one."""
     return file_ending(path, "a cloud is", _ENDS)
 
 
@@ -53,10 +53,10 @@ def _csv_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequ
     row = ",".join(["%.10g"] * len(heading)) + "\n"
 
     def write(q: Array, tip: Array, values: list[Array]) -> None:
-        table = np.round(np.column_stack([units.joints_out(arm, q), tip, *values]), 9) + 0.0  # + 0.0: no -0
+        table = np.round(np.column_stack([units.joints_out(arm, q), tip, *values]), 9) + 0.0  # + 0.0 turns -0 into 0
         for start in range(0, len(table), 4096):
-            part = table[start : start + 4096]
-            file.write((row * len(part) % tuple(part.ravel().tolist())).encode())
+            rows = table[start : start + 4096]
+            file.write((row * len(rows) % tuple(rows.ravel().tolist())).encode())
 
     yield write
 
@@ -65,7 +65,7 @@ def _csv_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequ
 def _ply_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
     lines = ["ply", "format binary_little_endian 1.0", f"comment {arm.name}, tip positions in mm, by armkin"]
     lines += [f"element vertex {count}", *(f"property float {name}" for name in ("x", "y", "z", *measures))]
-    # The header is ASCII and a line of it a line, whatever an arm is called.
+    # the header must be ASCII, while the name of an arm may have other characters
     file.write("".join(f"{line}\n" for line in [*lines, "end_header"]).encode("ascii", "replace"))
 
     def write(q: Array, tip: Array, values: list[Array]) -> None:
@@ -76,8 +76,8 @@ def _ply_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequ
 
 @contextmanager
 def _npz_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
-    """What writes joints (count, n) [deg | mm], positions (count, 3) [mm] and measures (count,) into a .npz."""
-    # A zip file takes one member after the other: each array waits in a nameless file beside the target.
+    """The writer of joints (count, n) [deg | mm], positions (count, 3) [mm] and measures (count,) for .npz files."""
+    # a zip file takes one member after another, so each array is first written to an unnamed temporary file
     folder = os.path.dirname(os.path.realpath(path))
     shapes = {"joints": (count, arm.n), "position": (count, 3), **dict.fromkeys(measures, (count,))}
     with ExitStack() as stack:
@@ -102,5 +102,5 @@ def _npz_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequ
 
 
 def _member(name: str) -> zipfile.ZipInfo:
-    # A date of its own, so that the same samples are the same file.
+    # a constant date gives identical files for identical samples
     return zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))

@@ -1,4 +1,4 @@
-"""How well an arm can move its tip at a pose, and how finely."""
+"""Measures of a posture: how well an arm can move its tip, and how precisely."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from armkin.reachability.volume import tip_freedoms
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-_MAX_MOTORS = 14  # motors, at most, of an arm: 8,192 combinations of signs a pose
+_MAX_MOTORS = 14  # most motors of an arm, 8,192 combinations of signs for a posture
 MEASURES = ("manipulability", "step_error")
 
 
 def measure_function(arm: Arm, name: str) -> Callable[[Array], Array]:
-    """The function (N, n) [rad | mm] -> (N,) of a measure's name, its constants worked out.
+    """The function (N, n) [rad | mm] -> (N,) that computes a measure.
 
-    step_error [mm]: how far the tip is off when every motor is half a pulse off, in the worst combination of signs:
-    the largest ``|J M^-1 s / 2|`` over all s of +1 and -1, J the linear rows of the Jacobian, M the motors matrix
-    (pulses per rad | mm). To first order it bounds the error of rounding joint values to pulses.
+    step_error [mm]: error of the tip if every motor is half a pulse off, for the worst combination of signs: the
+    largest ``|J M^-1 s / 2|`` over all s of +1 and -1, J the linear rows of the Jacobian, M the motors matrix (pulses
+    per rad | mm). To first order it bounds the error of rounding joint values to pulses.
     manipulability: the product of the singular values of J (Yoshikawa, Manipulability of Robotic Mechanisms, 1985,
     eq. 13), a power of mm; of an arm that moves in a plane, within that plane.
     """
@@ -47,25 +47,25 @@ def measure_function(arm: Arm, name: str) -> Callable[[Array], Array]:
 def _singular_value_product(J: Array) -> Array:
     """Product of the singular values of J (N, k, n)."""
     k, n = J.shape[1:]
-    if k == n:  # no square root, hence no loss of digits at a singular pose
+    if k == n:  # without a square root no digits are lost at a singular posture
         return np.asarray(np.abs(np.linalg.det(J)))
     square = J @ J.transpose(0, 2, 1) if k < n else J.transpose(0, 2, 1) @ J
     return np.asarray(np.sqrt(np.maximum(np.linalg.det(square), 0.0)))
 
 
 def _longest_sum(columns: Array) -> Array:
-    """Largest length of a sum of +- the columns of (N, 3, m), all combinations of signs.
+    """Largest length of a sum of the columns of (N, 3, m) over all combinations of signs.
 
-    The combinations run in the order of a Gray code: each differs from the one before in one sign. The
-    last sign stays: the negative of a sum is as long as the sum.
+    The combinations follow a Gray code, so that each differs from the previous one in one sign. The last sign is
+    constant, because the negative of a sum is as long as the sum.
     """
     step = 2.0 * np.ascontiguousarray(columns.transpose(2, 1, 0))  # (m, 3, N)
     total = 0.5 * step.sum(axis=0)
-    worst = np.einsum("kn,kn->n", total, total)
-    positive = [True] * len(step)
+    greatest = np.einsum("kn,kn->n", total, total)
+    is_positive = [True] * len(step)
     for code in range(1, 1 << (len(step) - 1)):
         flip = (code & -code).bit_length() - 1
-        total += -step[flip] if positive[flip] else step[flip]
-        positive[flip] = not positive[flip]
-        np.maximum(worst, np.einsum("kn,kn->n", total, total), out=worst)
-    return np.asarray(np.sqrt(worst))
+        total += -step[flip] if is_positive[flip] else step[flip]
+        is_positive[flip] = not is_positive[flip]
+        np.maximum(greatest, np.einsum("kn,kn->n", total, total), out=greatest)
+    return np.asarray(np.sqrt(greatest))

@@ -1,4 +1,4 @@
-"""Chunks that an engine answers, kept beside the file that they become: run again after a kill, it goes on."""
+"""Keeps the results of chunks beside the file that they become, so that an interrupted run can be resumed."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from armkin.engines.ordered_chunks import Engine, in_order
 
 
 class NumberedChunk(Protocol):
-    """A piece of the work."""
+    """A part of the work with a number."""
 
     @property
     def number(self) -> int:
-        """The chunk's place among all, from 0."""
+        """The index of the chunk, from 0."""
 
 
 Chunk = TypeVar("Chunk", bound=NumberedChunk)
@@ -26,7 +26,7 @@ Chunk = TypeVar("Chunk", bound=NumberedChunk)
 
 @contextmanager
 def hold_parts(parts: Parts | None, count: int) -> Iterator[None]:
-    """Hold the parts of a file that is made of `count` chunks: one alone is not worth it."""
+    """Keep the parts of a file of `count` chunks during the block, unless there is only one."""
     if parts is not None and count > 1:
         parts.begin()
     try:
@@ -43,7 +43,7 @@ def chunk_tables(
     chunks: Iterable[Chunk],
     parts: Parts | None,
 ) -> Iterator[tuple[int, Table]]:
-    """Number and columns of all chunks, in any order: those that an earlier run has kept, and the others, kept now."""
+    """Number and columns of all chunks in any order, read if an earlier run kept them, else computed and kept."""
     kept_numbers: deque[int] = deque()
 
     def missing_chunks() -> Iterator[Chunk]:

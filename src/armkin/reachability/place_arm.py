@@ -1,4 +1,4 @@
-"""An arm at a place, among keep-outs that stand with the targets."""
+"""An arm at a place, with obstacles that are fixed to the frame of the targets."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.keep_out_keys import Entry
 
-ROUNDED_DEPTH = 1e-6  # depth [mm] to which a base stands in an obstacle by rounding
+ROUNDED_DEPTH = 1e-6  # depth [mm] of a base in an obstacle that counts as rounding
 
 
 class Obstacles(NamedTuple):
-    """What stands with the targets: keep-outs, and how far arms stay away from them [mm]."""
+    """Keep-outs fixed to the frame of the targets, and the clearance [mm] that arms keep from them."""
 
     keep_out: tuple[Entry, ...] = ()
     clearance: float = 0.0
@@ -34,9 +34,9 @@ class Obstacles(NamedTuple):
 
 
 def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm, Obstacles]:
-    """An arm with its own keep-outs alone, and those of its scene and of another.
+    """The arm with only its own keep-outs, and the obstacles of its scene and of another one.
 
-    What the arm's bodies keep from each other is the arm's own, wherever it is asked for.
+    The entry `self`, for hits between bodies, goes with the arm, even if a scene contains it.
     """
     count = len(arm.keep_out) - arm.of_scene
     own, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
@@ -46,40 +46,40 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
         obstacles, clearance, sha256 = [*obstacles, *added.keep_out], max(clearance, added.clearance), added.sha256
     if not obstacles:
         return arm, Obstacles()
-    selves = tuple(entry for entry in obstacles if entry.kind == "self")
+    self_entries = tuple(entry for entry in obstacles if entry.kind == "self")
     if not any(entry.kind == "self" for entry in own):
-        own += selves[:1]
-    still = tuple(entry for entry in obstacles if entry.kind != "self")
-    return replace(arm, keep_out=own, clearance=clearance, of_scene=0), Obstacles(still, clearance, sha256)
+        own += self_entries[:1]
+    fixed = tuple(entry for entry in obstacles if entry.kind != "self")
+    return replace(arm, keep_out=own, clearance=clearance, of_scene=0), Obstacles(fixed, clearance, sha256)
 
 
 def free_at_place(
     arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float, q: Array
 ) -> NDArray[np.bool_]:
-    """Which postures (..., n) of an arm at a place hit nothing of what stands there; nan: none.
+    """Which postures (..., n) of an arm at a place hit no obstacle; False for nan.
 
-    None does where the base's axis goes into an obstacle: a base may stand on one, but not in it.
+    All are False if the base is inside an obstacle; it may stand on one.
     """
-    stands = _arm_among_obstacles(arm, obstacles, position, turn)
-    held = guard(stands)
-    base = held.bodies.owner == 0
-    begin, end = held.bodies.begin[base].T, held.bodies.end[base].T
-    if any((shape.distance(begin, end) < -ROUNDED_DEPTH).any() for _, shape in held.obstacles):
+    placed_arm = _arm_among_obstacles(arm, obstacles, position, turn)
+    arm_guard = guard(placed_arm)
+    is_base = arm_guard.bodies.owner == 0
+    begin, end = arm_guard.bodies.begin[is_base].T, arm_guard.bodies.end[is_base].T
+    if any((shape.distance(begin, end) < -ROUNDED_DEPTH).any() for _, shape in arm_guard.obstacles):
         return np.zeros(q.shape[:-1], bool)
-    return hits_nothing(stands, q)
+    return hits_nothing(placed_arm, q)
 
 
 @lru_cache(maxsize=4)
 def _arm_among_obstacles(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
-    """The arm at a place, in the targets' frame, among what stands with the targets."""
+    """The arm at a place, in the frame of the targets, with the obstacles as its only keep-outs."""
     return replace(_move_arm(arm, position, turn), keep_out=obstacles.keep_out, clearance=obstacles.clearance)
 
 
 def arm_at_place(arm: Arm, obstacles: Obstacles, position: tuple[float, float, float], turn: float) -> Arm:
-    """The arm at a place, in the targets' frame, with its own keep-outs, which move with it, and what stands there."""
-    mine = tuple(_move_entry(entry, position, turn) for entry in arm.keep_out)
+    """The arm at a place, in the frame of the targets, with its own keep-outs moved along and the obstacles."""
+    own_entries = tuple(_move_entry(entry, position, turn) for entry in arm.keep_out)
     clearance = max(arm.clearance, obstacles.clearance)
-    return replace(_move_arm(arm, position, turn), keep_out=mine + obstacles.keep_out, clearance=clearance)
+    return replace(_move_arm(arm, position, turn), keep_out=own_entries + obstacles.keep_out, clearance=clearance)
 
 
 def _move_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Arm:
@@ -87,13 +87,13 @@ def _move_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Ar
     P[:3, :3], P[:3, 3] = rotation_about(2, turn), position
     link, base = arm.link.copy(), P @ arm.base
     link[0] = P @ link[0]
-    for moved in (link, base):
-        moved.flags.writeable = False
+    for matrix in (link, base):
+        matrix.flags.writeable = False
     return replace(arm, link=link, base=base)
 
 
 def _move_entry(entry: Entry, position: tuple[float, float, float], turn: float) -> Entry:
-    """A keep-out that stands with an arm, where the arm stands at a place."""
+    """A keep-out of an arm after the arm is moved to a place."""
 
     def placed(point: Sequence[float]) -> tuple[float, float, float]:
         x, y, z = (rotation_about(2, turn) @ np.array(point) + position).tolist()
@@ -112,6 +112,6 @@ def _move_entry(entry: Entry, position: tuple[float, float, float], turn: float)
                 update={"size": tuple(high - low), "xyz": tuple(0.5 * (low + high)), "min": None, "max": None}
             )
         roll, pitch, yaw = box.rpy
-        put = {"xyz": placed(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
-        return entry.model_copy(update={"box": box.model_copy(update=put)})
+        pose = {"xyz": placed(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
+        return entry.model_copy(update={"box": box.model_copy(update=pose)})
     return entry

@@ -1,8 +1,8 @@
-"""Which branches carry a way of the tool from a place: one branch from its first target to its last.
+"""Branches that follow all targets of a path from a place.
 
-A branch goes on from a target to the next where no joint turns by `MAX_TURN` or more between them, so that its copies
-by whole turns are one way of each joint; all of it lies within the limits, and hits nothing. This asks at targets
-alone: what is between them is proved when the best places are planned.
+A branch continues from a target to the next if no joint turns by `MAX_TURN` or more between them, so that the motion of
+each joint is unique up to whole turns. It has to be within the limits and to hit nothing at all targets; the motion
+between targets is checked when the best places are planned.
 """
 
 from __future__ import annotations
@@ -21,49 +21,49 @@ if TYPE_CHECKING:
     from armkin.inverse.answers.solutions import Solutions
     from armkin.model.arm import Arm
 
-MAX_TURN = 0.5 * math.pi  # turn [rad], at most, of a joint from one target to the next
+MAX_TURN = 0.5 * math.pi  # turn [rad] of a joint between targets from which on a branch is interrupted
 
 
 def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
-    """Branches that go all the way: which ones do (B,), and the least and greatest joint values on it (B, n).
+    """Which branches follow all targets (B,), and their least and greatest joint values (B, n), whatever the limits.
 
-    s: answers to targets in their order (S, ...); free: (S, B) which hit nothing. Of limits nothing is said.
+    s: answers to the targets in their order (S, ...); free: (S, B) which postures hit nothing.
     """
     number = s.branch  # a branch keeps its number along a path
     S, B, n = s.q.shape
-    way = np.full((S, max(B, int(number.max(initial=-1)) + 1), n), np.nan)
-    branch_there = s.valid & free & (number >= 0)
+    values = np.full((S, max(B, int(number.max(initial=-1)) + 1), n), np.nan)
+    is_usable = s.valid & free & (number >= 0)
     row = np.broadcast_to(np.arange(S)[:, None], (S, B))
-    way[row[branch_there], number[branch_there]] = s.q[branch_there]
-    step = np.diff(way, axis=0)
-    turning = ~s.arm.prismatic
-    step[:, :, turning] -= TURN * np.rint(step[:, :, turning] / TURN)
+    values[row[is_usable], number[is_usable]] = s.q[is_usable]
+    step = np.diff(values, axis=0)
+    revolute = ~s.arm.prismatic
+    step[:, :, revolute] -= TURN * np.rint(step[:, :, revolute] / TURN)
     with np.errstate(invalid="ignore"):
-        carries = np.asarray(
-            ~np.isnan(way).any(axis=(0, 2)) & ~(np.abs(step[:, :, turning]) >= MAX_TURN).any(axis=(0, 2))
+        is_complete = np.asarray(
+            ~np.isnan(values).any(axis=(0, 2)) & ~(np.abs(step[:, :, revolute]) >= MAX_TURN).any(axis=(0, 2))
         )
-    along = np.concatenate([way[:1], way[:1] + np.cumsum(step, axis=0)])
-    return carries, along.min(axis=0), along.max(axis=0)
+    unwrapped = np.concatenate([values[:1], values[:1] + np.cumsum(step, axis=0)])
+    return is_complete, unwrapped.min(axis=0), unwrapped.max(axis=0)
 
 
 def some_copy_legal(arm: Arm, low: Array, high: Array, joints: range) -> Bool:
-    """Whether some copies of the ways of these joints, from low to high (..., n), are within limits: (...)."""
-    inside = np.ones(low.shape[:-1], bool)
-    for j in joints:
-        lower, upper = float(arm.lower[j]) - SLACK, float(arm.upper[j]) + SLACK
-        first = low[..., j]
-        if not arm.prismatic[j] and math.isfinite(lower):
+    """Whether the motions of these joints from low to high (..., n) have copies within limits: (...)."""
+    is_legal = np.ones(low.shape[:-1], bool)
+    for joint in joints:
+        lower, upper = float(arm.lower[joint]) - SLACK, float(arm.upper[joint]) + SLACK
+        first = low[..., joint]
+        if not arm.prismatic[joint] and math.isfinite(lower):
             first = first + TURN * np.ceil((lower - first) / TURN)
-        elif not arm.prismatic[j] and math.isfinite(upper):
-            continue  # a limit on one side alone: some copy is below it
-        inside &= (first >= lower) & (first + (high[..., j] - low[..., j]) <= upper)
-    return inside
+        elif not arm.prismatic[joint] and math.isfinite(upper):
+            continue  # with an upper limit only, some copy is below it
+        is_legal &= (first >= lower) & (first + (high[..., joint] - low[..., joint]) <= upper)
+    return is_legal
 
 
 def branch_arc(arm: Arm, low: Array, high: Array, count: int, sense: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Turns i 2 pi / count by which joint 1's way, from low to high (B,) plus sense times the turn, is within limits.
+    """Turns i 2 pi / count for which the motion of joint 1, low to high (B,) plus sense times the turn, is legal.
 
-    Returns the first of each arc, and how many.
+    Returns the first index and the length of each arc.
     """
     lower, upper = float(arm.lower[0]) - SLACK, float(arm.upper[0]) + SLACK
     if sense < 0:

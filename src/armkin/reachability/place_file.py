@@ -1,4 +1,4 @@
-"""Places as a file of columns: .npz, .parquet, .jsonl or .csv."""
+"""Writes places to a file of columns: .npz, .parquet, .jsonl or .csv."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
-    """All places as a file of columns: .npz, .parquet, .jsonl or .csv; parts of an unfinished run go."""
+    """Write all places to a file of columns, .npz, .parquet, .jsonl or .csv, and remove parts of unfinished runs."""
     path = os.fspath(out)
     file_format = format_of(path)
     table = place_columns(places)
@@ -32,16 +32,16 @@ def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:
 
 
 def place_columns(places: Sequence[Place]) -> Table:
-    """One row a place: robot, x, y, z [mm], yaw [deg], targets reached, of how many, margin [mm]."""
+    """One row for each place: robot, x, y, z [mm], yaw [deg], targets reached, number of targets, margin [mm]."""
     names = tuple(dict.fromkeys(place.arm.name for place in places))
     rows = []
     for place in places:
         x, y, yaw = (
             axis.ravel() for axis in np.meshgrid(place.x, place.y, np.degrees(place.yaw).round(9), indexing="ij")
         )
-        z, of = np.full(x.shape, place.z), np.full(x.shape, place.of)
+        z, target_count = np.full(x.shape, place.z), np.full(x.shape, place.of)
         robots = np.full(x.shape, names.index(place.arm.name))
-        rows.append([robots, x, y, z, yaw, place.reached.ravel(), of, place.margin.ravel()])
+        rows.append([robots, x, y, z, yaw, place.reached.ravel(), target_count, place.margin.ravel()])
     robot, *numbers = (np.concatenate(parts) for parts in zip(*rows, strict=True))
-    named = ("x_mm", "y_mm", "z_mm", "yaw_deg", "reached", "of", "margin_mm")
-    return {"robot": Words(robot, names), **dict(zip(named, numbers, strict=True))}
+    column_names = ("x_mm", "y_mm", "z_mm", "yaw_deg", "reached", "of", "margin_mm")
+    return {"robot": Words(robot, names), **dict(zip(column_names, numbers, strict=True))}

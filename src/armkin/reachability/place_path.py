@@ -1,4 +1,4 @@
-"""A path from the best places: planned as the arm there would move along it."""
+"""Plans a path for an arm at its best places."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
     from armkin.path_file import PathFile
 
-STEP = 0.01  # distance, as a share of the arm's reach, from target to target along a path
+STEP = 0.01  # distance between targets along a path, as a share of the arm's reach
 
 
 @dataclass(frozen=True)
 class PathFromPlace:
-    """A place from which a path was planned. index: in the arrays of `Place`; plan: None where it is refused."""
+    """A place from which a path was planned. index: in the arrays of `Place`; plan: None if it was refused."""
 
     index: tuple[int, int, int]
     plan: PathPlan | None = field(repr=False)
@@ -34,7 +34,7 @@ class PathFromPlace:
 
 
 def path_of(targets: Any) -> PathFile | None:
-    """A path by its file's name, its model or its data; None: these are targets."""
+    """The path of a file name, a model or its data; None for an array of targets."""
     if isinstance(targets, str | os.PathLike):
         name = os.fspath(targets)
         if Path(name).suffix.lower() not in (".yaml", ".yml"):
@@ -47,24 +47,24 @@ def path_of(targets: Any) -> PathFile | None:
 
 
 def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
-    """The task, and the targets of each way that one branch is to carry."""
+    """The task, and the targets of each part of the path that one branch has to follow."""
     from armkin.motion.path_planner.path_outline import route_targets
 
     task, routes = route_targets(arm, file, STEP * arm.reach)
-    return task, [np.asarray(way) for way in routes]
+    return task, [np.asarray(route) for route in routes]
 
 
 def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
-    """The joint that a path's plan holds, and where it may [rad], as `armkin.path` asks them; "": none."""
+    """The redundant joint that a plan holds, and its possible values [rad], as in `armkin.path`; "" without one."""
     from armkin.inverse.solvers.redundancy import redundancy
     from armkin.motion.path_planner.redundant_joint import values_to_hold
 
-    spare = redundancy(arm, file.task)
-    return ("", ()) if spare is None else (arm.joint_names[spare.joint], values_to_hold(arm, file, spare))
+    redundant = redundancy(arm, file.task)
+    return ("", ()) if redundant is None else (arm.joint_names[redundant.joint], values_to_hold(arm, file, redundant))
 
 
 def missing_rates_text(arm: Arm) -> str:
-    """Why no path of an arm can be planned: the joints' rates that its file lacks; "" where it has them."""
+    """The reason why no path can be planned, joint rates missing in the file; "" if there is none."""
     from armkin.motion.joint_moves import check_rates
 
     try:
@@ -82,11 +82,11 @@ def plan_from_place(
     turn: float,
     file: PathFile,
 ) -> PathFromPlace:
-    """The path's plan from a place, or why there is none."""
+    """The plan of the path from a place, or the reason for none."""
     from armkin.motion.path_planner.path import path
 
-    anyones = file.model_copy(update={"robot": None})  # another robot may stand in for the one that it was made for
+    any_robot_file = file.model_copy(update={"robot": None})  # the path may name another robot
     try:
-        return PathFromPlace(index, path(arm_at_place(arm, obstacles, position, turn), anyones))
+        return PathFromPlace(index, path(arm_at_place(arm, obstacles, position, turn), any_robot_file))
     except NoSolutionError as error:
         return PathFromPlace(index, None, str(error).splitlines()[0])

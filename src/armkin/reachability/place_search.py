@@ -1,14 +1,15 @@
-"""`armkin.place`: where to put an arm, so that it reaches given targets.
+"""`armkin.place`: finds places from which an arm reaches given targets.
 
-A place is a position of the arm's frame (the one in which its targets are given, before its `base`) on a grid in the
-plane of the targets' frame, and a yaw about its z axis. Where joint 1's axis is the frame's z axis, a yaw adds to joint
-1 alone: one solve a target and position answers all yaws as an arc. Other arms are asked yaw by yaw.
+A place is a position of the arm's frame (in which its targets are given, before its `base`) on a grid in the xy plane
+of the targets' frame, and a yaw about its z axis. If the axis of joint 1 is the z axis of the arm's frame, a yaw
+changes joint 1 only, and one solve for each target and position answers all yaws as an arc. Other arms are solved for
+each yaw.
 
-A path is reached where one branch carries each of its ways between joint moves (`place_branches`); the best places are
-then planned (`place_path`). An arm with a redundant joint is asked with that held at each of the values that
-`armkin.path` asks, and reaches what it reaches at the best of them.
+A path counts as reached if one branch follows each part of it between joint moves (`place_branches`); the path is then
+planned from the best places (`place_path`). A redundant joint is held at each of the values that `armkin.path` tries,
+and the best of them counts.
 
-The robot's own keep-outs move with it; those of a scene stand with the targets.
+The robot's own keep-outs move with it; those of a scene are fixed to the targets' frame.
 """
 
 from __future__ import annotations
@@ -53,9 +54,9 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.path_file import PathFile
 
-MAX_PLACES = 10**7  # places, at most, of a search
-SOLVES, ANSWERS = 40_000, 10**7  # solves of a chunk where each place is solved; places of one where most are read off
-PLANS, TRIES = 3, 12  # places that a path is planned from, and most that are tried for them
+MAX_PLACES = 10**7  # most places of a search
+SOLVES, ANSWERS = 40_000, 10**7  # solves of a chunk, and its targets times places if most of these need no solve
+PLANS, TRIES = 3, 12  # number of plans of a path, and most places that are tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,7 @@ class Place:
 
 
 class PositionChunk(NamedTuple):
-    """Some positions (P, 2) [mm] of one arm."""
+    """Some positions (P, 2) [mm] for one arm."""
 
     number: int
     question: int  # number of the question
@@ -167,11 +168,11 @@ def place(
     >>> found.reach_all > 0, found.of
     (True, 2)
     """
-    several = [arms] if not isinstance(arms, Sequence) else list(arms)
+    arm_list = [arms] if not isinstance(arms, Sequence) else list(arms)
     settings = {"area": area, "step": step, "yaw": yaw, "z": z}
-    tell = None if progress is None else lambda done, total: progress(done)
+    report = None if progress is None else lambda done, total: progress(done)
     return place_several(
-        several, [targets] * len(several), settings, scene, out, Engine(workers, cluster), tell, solve or ik
+        arm_list, [targets] * len(arm_list), settings, scene, out, Engine(workers, cluster), report, solve or ik
     )
 
 
@@ -197,9 +198,9 @@ def place_several(
     work_list = _chunks(questions, [axes for axes, _ in grids])
     counts = _count_reached(questions, work_list, engine, _parts(questions, settings, out), progress)
     places = []
-    for i, (question, grid, file) in enumerate(zip(questions, grids, paths, strict=True)):
-        mine = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == i])
-        places.append(_place_result(question, *grid, mine, settings, file))
+    for number, (question, grid, file) in enumerate(zip(questions, grids, paths, strict=True)):
+        arm_counts = np.concatenate([counts[chunk.number] for chunk in work_list if chunk.question == number])
+        places.append(_place_result(question, *grid, arm_counts, settings, file))
     return places
 
 
@@ -210,7 +211,7 @@ def _count_reached(
     parts: Parts | None,
     progress: Callable[[int, int], None] | None,
 ) -> dict[int, NDArray[np.int64]]:
-    """How many targets are reached from each position and yaw of a chunk (P K,), by the chunk's number."""
+    """Number of targets reached from each position and yaw of a chunk (P K,), by the number of the chunk."""
     done, total = 0, sum(len(chunk.positions) for chunk in work_list)
     counts: dict[int, NDArray[np.int64]] = {}
     with kept_chunks.hold_parts(parts, len(work_list)):
@@ -223,12 +224,15 @@ def _count_reached(
 
 
 def _chunks(questions: Sequence[PlaceQuestion], grids: Sequence[tuple[Array, Array]]) -> list[PositionChunk]:
-    """All positions of all arms, some at a time."""
-    made: list[PositionChunk] = []
-    for i, (question, axes) in enumerate(zip(questions, grids, strict=True)):
+    """All positions of all arms, in chunks."""
+    chunks: list[PositionChunk] = []
+    for number, (question, axes) in enumerate(zip(questions, grids, strict=True)):
         positions = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
-        made += [PositionChunk(len(made) + k, i, part) for k, part in enumerate(_position_blocks(question, positions))]
-    return made
+        chunks += [
+            PositionChunk(len(chunks) + offset, number, part)
+            for offset, part in enumerate(_position_blocks(question, positions))
+        ]
+    return chunks
 
 
 def _place_result(
@@ -239,14 +243,14 @@ def _place_result(
     settings: dict[str, Any],
     file: PathFile | None,
 ) -> Place:
-    """The result of one arm; counts: (places,) targets reached from each of the grid, `inner` of it in the area."""
-    every = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
-    reached = every[inner]
-    margin = margins(every == len(question.targets), settings["step"])[inner]
+    """The result of one arm; counts: (places,) reached targets on the grid, whose part `inner` is the area."""
+    grid_counts = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
+    reached = grid_counts[inner]
+    margin = margins(grid_counts == len(question.targets), settings["step"])[inner]
     x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(question.yaws) * settings["yaw"]
     room = limit_rooms(question, x, y, yaws)
     best = best_place(room, reached, margin)
-    goals, none = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
+    goals, no_postures = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
     place = Place(
         arm=question.arm,
         x=x,
@@ -258,38 +262,38 @@ def _place_result(
         of=len(question.targets),
         best=best,
         positions=goals,
-        postures=none,
+        postures=no_postures,
     )
     return _add_postures(question, place if file is None else _plan_best_places(question, place, file, room))
 
 
 def _add_postures(question: PlaceQuestion, place: Place) -> Place:
-    """The place with the legal posture nearest to home for each target that is reached from the best place."""
-    position, turn = place.xyz[:2], float(place.yaw[place.best[2]])
+    """The place with a legal posture, the nearest to home, for each target reached from the best place."""
+    position, yaw = place.xyz[:2], float(place.yaw[place.best[2]])
     plan = next((path.plan for path in place.planned if path.index == place.best and path.plan is not None), None)
     if plan is not None and plan.held:
         question = question._replace(values=tuple(plan.held.values()))
-    fixed = at_value(question, position, turn)
-    s, legal = free_from(fixed, position, turn)
+    held_question = at_value(question, position, yaw)
+    solutions, legal = free_from(held_question, position, yaw)
     row = np.flatnonzero(legal.any(axis=1))
-    q = s.q[row, np.where(legal, s.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
-    if fixed.full_arm is None:
+    q = solutions.q[row, np.where(legal, solutions.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
+    if held_question.full_arm is None:
         return replace(place, postures=np.asarray(q))
-    held = fixed.full_arm.joints
+    held = held_question.full_arm.joints
     return replace(place, postures=unlock(question.arm, held, q) if len(row) else place.postures, held=held)
 
 
 def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, room: Room) -> Place:
-    """The place with its best places planned; one that cannot be planned does not reach all."""
-    if why := place_path.missing_rates_text(question.arm):
-        return replace(place, unplanned=why)
+    """The place with plans from its best places; a place without a plan does not reach all targets."""
+    if reason := place_path.missing_rates_text(question.arm):
+        return replace(place, unplanned=reason)
     tried: list[PathFromPlace] = []
-    left = place.reached.copy()
-    while left.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
-        i, j, k = best_place(room, left, place.margin)
+    untried = place.reached.copy()
+    while untried.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
+        i, j, k = best_place(room, untried, place.margin)
         xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
         tried.append(place_path.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
-        left[i, j, k] = -1
+        untried[i, j, k] = -1
         if tried[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
     best = next((path.index for path in tried if path.plan is not None), None)
@@ -301,16 +305,16 @@ def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, roo
 def _question(
     arm: Arm, targets: Any, file: PathFile | None, settings: dict[str, Any], scene: str | os.PathLike[str] | None
 ) -> PlaceQuestion:
-    """What is asked of one arm: its own keep-outs apart from those of a scene."""
+    """The question for one arm, with its own keep-outs separated from those of a scene."""
     ways: tuple[int, ...] = ()
-    spare, held = "", tuple[float, ...]()
+    redundant_joint, held_values = "", tuple[float, ...]()
     if file is None:
         task = task_for(arm, None)
     else:
-        task, each_way = place_path.ways_of_path(arm, file)
-        targets, ways = np.concatenate(each_way), tuple(map(len, each_way))
-        spare, held = place_path.joint_to_hold(arm, file)
-    arm, around = split_keep_outs(arm, scene)
+        task, routes = place_path.ways_of_path(arm, file)
+        targets, ways = np.concatenate(routes), tuple(map(len, routes))
+        redundant_joint, held_values = place_path.joint_to_hold(arm, file)
+    arm, obstacles = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values, *_ = read_targets(task, targets)
     return PlaceQuestion(
@@ -320,17 +324,17 @@ def _question(
         yaws=yaws,
         step=settings["yaw"],
         z=settings["z"],
-        obstacles=around,
+        obstacles=obstacles,
         ways=ways,
-        spare=spare,
-        values=held,
+        spare=redundant_joint,
+        values=held_values,
     )
 
 
 def _parts(
     questions: list[PlaceQuestion], settings: dict[str, Any], out: str | os.PathLike[str] | None
 ) -> Parts | None:
-    """What is answered, kept beside the file until it stands."""
+    """The kept results beside the file, which are removed after it is written."""
     if out is None:
         return None
     files.file_ending(out, "places are", ENDINGS)
@@ -344,24 +348,24 @@ def _parts(
 def _axes(
     question: PlaceQuestion, area: Sequence[float] | None, step: float
 ) -> tuple[tuple[Array, Array], tuple[slice, slice]]:
-    """The grid's x and y, as far as any place can reach all targets, and which of them are in the area."""
+    """The x and y of a grid that contains all places with all targets in reach, and the slices in the area."""
     arm = question.arm
     p = positions_of(question.task, question.targets)[:, :2]
-    far = arm.reach + float(np.linalg.norm(arm.link[0][:2, 3]))
-    low, high = p.max(axis=0) - far, p.min(axis=0) + far  # beyond, one target is out of reach
+    distance = arm.reach + float(np.linalg.norm(arm.link[0][:2, 3]))
+    low, high = p.max(axis=0) - distance, p.min(axis=0) + distance  # outside this box some target is out of reach
     if area is None:
-        area = [v for i in (0, 1) for v in (p[:, i].min() - arm.reach, p[:, i].max() + arm.reach)]
+        area = [v for axis in (0, 1) for v in (p[:, axis].min() - arm.reach, p[:, axis].max() + arm.reach)]
     if len(area) != 4 or not np.isfinite(area).all() or area[1] < area[0] or area[3] < area[2]:
         raise UsageError("area: XMIN,XMAX,YMIN,YMAX in mm, each from the lower to the upper end")
     axes, inner = [], []
-    for i, (start, end) in enumerate(((area[0], area[1]), (area[2], area[3]))):
+    for axis, (start, end) in enumerate(((area[0], area[1]), (area[2], area[3]))):
         last = math.floor((end - start) / step + 1e-9)
-        before = max(math.ceil((start - low[i]) / step), 0) + 1
-        behind = max(math.ceil((high[i] - start) / step) - last, 0) + 1
-        if (last + before + behind + 1) ** 2 * question.yaws > 4 * MAX_PLACES:
+        count_below = max(math.ceil((start - low[axis]) / step), 0) + 1
+        count_above = max(math.ceil((high[axis] - start) / step) - last, 0) + 1
+        if (last + count_below + count_above + 1) ** 2 * question.yaws > 4 * MAX_PLACES:
             raise UsageError(f"more than {MAX_PLACES:,} places: take a larger step or a smaller area", most=MAX_PLACES)
-        axes.append(start + np.arange(-before, last + behind + 1) * step)
-        inner.append(slice(before, before + last + 1))
+        axes.append(start + np.arange(-count_below, last + count_above + 1) * step)
+        inner.append(slice(count_below, count_below + last + 1))
     return (axes[0], axes[1]), (inner[0], inner[1])
 
 
@@ -374,5 +378,5 @@ def _position_blocks(question: PlaceQuestion, positions: Array) -> Iterator[Arra
 
 
 def count_chunk(questions: list[PlaceQuestion], chunk: PositionChunk) -> tuple[int, Table]:
-    """How many targets are reached from each position and yaw: (P K,)."""
+    """Number of targets reached from each position and yaw: (P K,)."""
     return chunk.number, {"reached": reached_counts(questions[chunk.question], chunk.positions).ravel()}

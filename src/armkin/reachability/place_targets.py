@@ -1,4 +1,4 @@
-"""What an arm reaches from a place: which targets from each yaw at a position, by arcs of joint 1 where that does."""
+"""Targets that an arm reaches from a place: for each position and yaw, by arcs of joint 1 if its axis allows it."""
 
 from __future__ import annotations
 
@@ -29,13 +29,13 @@ if TYPE_CHECKING:
 
 Solve = Callable[["Arm", Array, str], Solutions]  # `armkin.ik` of an arm, targets and a task
 
-TURNING = ("xy_theta", "xyz_yaw")  # tasks of which an angle turns with the arm
-BLOCK_TARGETS = 8_192  # targets asked together: what is known of them stays in the cache
-BEYOND_REACH = 1e-6  # distance [reaches] beyond the reach from which on nothing solves a target
+TURNING = ("xy_theta", "xyz_yaw")  # tasks with an angle that depends on the yaw of the arm
+BLOCK_TARGETS = 8_192  # targets solved together, so that their arrays fit the cache
+BEYOND_REACH = 1e-6  # distance [reaches] beyond the reach from which on a target is not solved
 
 
 class HeldArm(NamedTuple):
-    """An arm, and which of its joints are held at which values [rad]."""
+    """An arm, and the values [rad] of its held joints."""
 
     arm: Arm
     joints: dict[str, float]
@@ -51,35 +51,35 @@ class PlaceQuestion(NamedTuple):
     step: float  # [rad] of the yaw
     z: float
     obstacles: Obstacles = Obstacles()
-    ways: tuple[int, ...] = ()  # targets of each way of a path that one branch is to carry
-    spare: str = ""  # the redundant joint, which a path's plan holds,
-    values: tuple[float, ...] = ()  # values [rad] where it may stand, the best first
-    full_arm: HeldArm | None = None  # where one of the values is chosen
-    solve: Solve = ik  # a function of a module, as it travels
+    ways: tuple[int, ...] = ()  # number of targets of each part of a path that one branch has to follow
+    spare: str = ""  # name of the redundant joint that a plan holds
+    values: tuple[float, ...] = ()  # its possible values [rad], the best first
+    full_arm: HeldArm | None = None  # set after one of the values is chosen
+    solve: Solve = ik  # a function of a module, as it is pickled
 
     @property
     def by_arcs(self) -> bool:
-        """Whether a yaw adds to joint 1 alone, and the yaws divide the circle."""
+        """Whether a yaw changes joint 1 only, and the yaws divide the circle."""
         on_axis = np.abs(self.arm.link[0][:2, 3]).max() <= STRAIGHT * self.arm.reach
         return self._stands_upright and bool(on_axis) and abs(self.yaws * self.step - TURN) < STRAIGHT
 
     @property
     def by_distance_alone(self) -> bool:
-        """Whether what joints behind joint 1 are asked depends on the target's distance from that alone."""
-        turning = self.task.orientation != "none" or self.task.name in TURNING
-        return self._stands_upright and not turning and not self.by_arcs
+        """Whether the other joints depend only on the distance of a target from joint 1."""
+        needs_azimuth = self.task.orientation != "none" or self.task.name in TURNING
+        return self._stands_upright and not needs_azimuth and not self.by_arcs
 
     @property
     def _stands_upright(self) -> bool:
-        """Whether joint 1 turns about a line upright, as it is commanded, and nothing is kept out."""
+        """Whether joint 1 is revolute with a vertical axis and independent of other joints, without keep-outs."""
         arm = self.arm
-        free = not arm.keep_out and not self.obstacles.keep_out
-        plain = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and arm.n == self.task.constraints
-        return plain and free and bool(np.abs(arm.link[0][:2, 2]).max() <= STRAIGHT)
+        no_keep_outs = not arm.keep_out and not self.obstacles.keep_out
+        is_independent = not arm.prismatic[0] and bool((arm.ratio == 1.0).all()) and arm.n == self.task.constraints
+        return is_independent and no_keep_outs and bool(np.abs(arm.link[0][:2, 2]).max() <= STRAIGHT)
 
     @property
     def sense(self) -> int:
-        """How joint 1 turns with the yaw, in the arm's own frame."""
+        """The sign of the change of joint 1 with the yaw."""
         return -1 if self.arm.link[0][2, 2] > 0 else 1
 
 
@@ -89,54 +89,55 @@ def positions_of(task: Task, targets: Array) -> Array:
 
 
 def reached_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int64]:
-    """How many targets are reached from positions (P, 2) at each yaw: (P, K); of values to hold, at the best one."""
+    """Number of targets reached from positions (P, 2) at each yaw: (P, K), with the best value of a held joint."""
     if question.values:
         return _greatest_counts(question, positions)
-    at_once = len(positions) if question.by_distance_alone else max(BLOCK_TARGETS // len(question.targets), 1)
-    blocks = [positions[start : start + at_once] for start in range(0, len(positions), at_once)]
+    block_size = len(positions) if question.by_distance_alone else max(BLOCK_TARGETS // len(question.targets), 1)
+    blocks = [positions[start : start + block_size] for start in range(0, len(positions), block_size)]
     return np.concatenate([_count_targets(question, block, _legal_yaws(question, block)) for block in blocks])
 
 
 def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.int64]:
-    """How many targets are reached with a redundant joint held at its best value, from positions (P, 2): (P, K).
+    """Number of targets reached with a redundant joint held at its best value, from positions (P, 2): (P, K).
 
-    Keep-outs only take away: a place is asked among them where more is reached without them than is known.
+    Keep-outs only reduce the number. Positions are therefore first counted without keep-outs, and counted with them
+    only if the result could exceed the best one so far.
     """
     counts = np.zeros((len(positions), question.yaws), np.int64)
     blocked = question.arm.keep_out or question.obstacles.keep_out
-    bare = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
-    left = np.arange(len(positions))
-    for held, without in zip(each_value(question), each_value(bare), strict=True):
-        to_ask, counted = left, reached_counts(without, positions[left])
+    unobstructed = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
+    pending = np.arange(len(positions))
+    for held, free_question in zip(each_value(question), each_value(unobstructed), strict=True):
+        to_ask, counted = pending, reached_counts(free_question, positions[pending])
         if blocked:
-            to_ask = left[(counted > counts[left]).any(axis=1)]
+            to_ask = pending[(counted > counts[pending]).any(axis=1)]
         if len(to_ask):
             counts[to_ask] = np.maximum(counts[to_ask], reached_counts(held, positions[to_ask]) if blocked else counted)
-        left = left[(counts[left] < len(question.targets)).any(axis=1)]
-        if not len(left):
+        pending = pending[(counts[pending] < len(question.targets)).any(axis=1)]
+        if not len(pending):
             break
     return counts
 
 
 def each_value(question: PlaceQuestion) -> Iterator[PlaceQuestion]:
-    """The question with the redundant joint held at each value; itself where there is none to hold."""
+    """The question with the redundant joint held at each value; the question itself without such a joint."""
     if not question.values:
         yield question
     for value in question.values:
         full_arm = HeldArm(question.arm, {question.spare: value})
-        free_arm = _hold_joint(question.arm, question.spare, value)  # one of many arms: not worth being compiled
+        free_arm = _hold_joint(question.arm, question.spare, value)  # many arms, each too short-lived for compiling
         yield question._replace(arm=free_arm, values=(), full_arm=full_arm, solve=ik)
 
 
-def at_value(question: PlaceQuestion, position: Array, turn: float) -> PlaceQuestion:
-    """The question with the redundant joint held at the first value at which most is reached from one place."""
+def at_value(question: PlaceQuestion, position: Array, yaw: float) -> PlaceQuestion:
+    """The question with the redundant joint held at the first value that reaches most targets from one place."""
     if not question.values:
         return question
-    k, most, best = round(turn / question.step), -1, question
-    for held in each_value(question):
-        if (count := int(reached_counts(held, position[None])[0, k])) > most:
-            most, best = count, held
-        if most == len(question.targets):
+    yaw_index, greatest, best = round(yaw / question.step), -1, question
+    for candidate in each_value(question):
+        if (count := int(reached_counts(candidate, position[None])[0, yaw_index])) > greatest:
+            greatest, best = count, candidate
+        if greatest == len(question.targets):
             break
     return best
 
@@ -149,21 +150,21 @@ def _drop_keep_outs(arm: Arm) -> Arm:
 
 @lru_cache(maxsize=256)
 def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
-    """The arm with a joint held: one and the same for each value, so that its solver is prepared once."""
+    """The arm with a joint held; cached, so that its solver is prepared once."""
     return lock(arm, {joint: value})
 
 
 def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """How many targets are legal, (P, N, K) -> (P, K); of ways that one branch does not carry, less than all."""
+    """Number of legal targets, (P, N, K) -> (P, K); parts of a path without a common branch count as incomplete."""
     if not question.ways:
         return np.asarray(legal.sum(axis=1, dtype=np.int64))
     counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
     for length in question.ways:
-        way = slice(begin, begin + length)
-        count = legal[:, way].sum(axis=1, dtype=np.int64)
+        part = slice(begin, begin + length)
+        count = legal[:, part].sum(axis=1, dtype=np.int64)
         carried = count == length
         for p in np.flatnonzero(carried.any(axis=1)) if length > 1 else ():
-            carried[p] = _on_one_branch(question._replace(targets=question.targets[way]), positions[p], carried[p])
+            carried[p] = _on_one_branch(question._replace(targets=question.targets[part]), positions[p], carried[p])
         counts += np.where(carried, length, np.minimum(count, length - 1))
         begin += length
     return counts
@@ -189,38 +190,38 @@ def _legal_yaws(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_]:
 
 
 def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] | None:
-    """Which targets are reached, (P, N, K), by what the joints behind joint 1 do at their distance; None: no form."""
-    high = question.targets.copy()
+    """Which targets are reached, (P, N, K), from solutions at sampled distances; None without a closed form."""
+    shifted = question.targets.copy()
     if question.task.position > 2:
-        high[:, 2] -= question.z
+        shifted[:, 2] -= question.z
     turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
-    if (answer := by_radius(question.arm, question.task.name, high, positions, turns)) is None:
+    if (answer := by_radius(question.arm, question.task.name, shifted, positions, turns)) is None:
         return None
-    legal, open_ = answer
-    p, i, k = np.nonzero(open_)
+    legal, undecided = answer
+    p, i, k = np.nonzero(undecided)
     for start in range(0, len(p), BLOCK_TARGETS):
         block = slice(start, start + BLOCK_TARGETS)
-        beside = _shift_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
-        turn = turns[k[block]]
-        goals = _turn_targets(question.task, beside, turn, np.cos(turn), np.sin(turn))
+        shifted_targets = _shift_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
+        yaw = turns[k[block]]
+        goals = _turn_targets(question.task, shifted_targets, yaw, np.cos(yaw), np.sin(yaw))
         legal[p[block], i[block], k[block]] = _any_legal(question, goals)
     return legal
 
 
 def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
-    """At which yaws targets (M,) are reached from places (M, 2), by one solve each: (M, K)."""
+    """At which yaws targets (M,) are reached from places (M, 2), with one solve for each: (M, K)."""
     legal = np.zeros((len(target), question.yaws), bool)
-    near = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
-    goals = _shift_targets(question._replace(targets=question.targets[target[near]]), place[near])
-    left = np.arange(len(near))
-    if (parts := columns(question.arm, goals, question.task.name)) is not None:
-        edges = [left[:0]]
-        for part in parts:
-            legal[near[part.rows]] = _legal_turns(question, part.values, part.valid)
-            edges.append(part.rows.start + part.left)
-        left = np.concatenate(edges)
-    if len(left):
-        s, rows = question.solve(question.arm, goals[left], question.task.name), near[left]
+    in_reach = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
+    goals = _shift_targets(question._replace(targets=question.targets[target[in_reach]]), place[in_reach])
+    unsolved = np.arange(len(in_reach))
+    if (blocks := columns(question.arm, goals, question.task.name)) is not None:
+        edges = [unsolved[:0]]
+        for block in blocks:
+            legal[in_reach[block.rows]] = _legal_turns(question, block.values, block.valid)
+            edges.append(block.rows.start + block.left)
+        unsolved = np.concatenate(edges)
+    if len(unsolved):
+        s, rows = question.solve(question.arm, goals[unsolved], question.task.name), in_reach[unsolved]
         legal[rows] = _legal_turns(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
         edge = rows[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
@@ -230,96 +231,96 @@ def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) ->
 def _legal_turns(question: PlaceQuestion, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """At which yaws some branch is within limits: n joints' values at yaw 0 (B, M), valid (B, M) -> (M, K)."""
     arm, K = question.arm, question.yaws
-    allowed = valid
+    is_legal = valid
     for j in range(1, arm.n):
-        allowed = allowed & some_copy_legal(arm, values[j], j)
+        is_legal = is_legal & some_copy_legal(arm, values[j], j)
     first, length = legal_arc(arm, values[0], 0, K, question.sense)
-    return _covered_arcs(first, np.where(allowed, length, 0), K)
+    return _covered_arcs(first, np.where(is_legal, length, 0), K)
 
 
 def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
-    """At which yaws targets (M,) are reached from places (M, 2), by a solve for each yaw, many together: (M, K)."""
+    """At which yaws targets (M,) are reached from places (M, 2), with a solve for each yaw: (M, K)."""
     K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
     cosine, sine = np.cos(turns), np.sin(turns)
-    at_once = max(BLOCK_TARGETS // K, 1)
-    for start in range(0, len(target), at_once):
-        block = slice(start, start + at_once)
+    block_size = max(BLOCK_TARGETS // K, 1)
+    for start in range(0, len(target), block_size):
+        block = slice(start, start + block_size)
         m, k = np.nonzero(_within_reach(question, target[block], place[block], turns))
-        beside = _shift_targets(question._replace(targets=question.targets[target[block]]), place[block])
-        goals = _turn_targets(question.task, beside[m], turns[k], cosine[k], sine[k])
+        shifted_targets = _shift_targets(question._replace(targets=question.targets[target[block]]), place[block])
+        goals = _turn_targets(question.task, shifted_targets[m], turns[k], cosine[k], sine[k])
         legal[start + m, k] = _any_legal(question, goals)
     return legal
 
 
 def _any_legal(question: PlaceQuestion, goals: Array) -> NDArray[np.bool_]:
-    """Which targets, in the arm's frame, some branch within limits reaches: (N,)."""
-    arm, legal, left = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
+    """Which targets, in the arm's frame, are reached by a branch within limits: (N,)."""
+    arm, legal, unsolved = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
     isolated_answers = arm.n == question.task.constraints
-    if isolated_answers and (parts := columns(arm, goals, question.task.name)) is not None:
-        edges = [left[:0]]
-        for part in parts:
-            allowed = part.valid
+    if isolated_answers and (blocks := columns(arm, goals, question.task.name)) is not None:
+        edges = [unsolved[:0]]
+        for block in blocks:
+            is_legal = block.valid
             for j in range(arm.n):
-                allowed = allowed & some_copy_legal(arm, part.values[j], j)
-            legal[part.rows] = allowed.any(axis=0)
-            edges.append(part.rows.start + part.left)
-        left = np.concatenate(edges)
-    if len(left):
-        legal[left] = question.solve(arm, goals[left], question.task.name).within_limits.any(axis=1)
+                is_legal = is_legal & some_copy_legal(arm, block.values[j], j)
+            legal[block.rows] = is_legal.any(axis=0)
+            edges.append(block.rows.start + block.left)
+        unsolved = np.concatenate(edges)
+    if len(unsolved):
+        legal[unsolved] = question.solve(arm, goals[unsolved], question.task.name).within_limits.any(axis=1)
     return legal
 
 
 def _within_reach(question: PlaceQuestion, target: NDArray[np.intp], place: Array, turns: Array) -> NDArray[np.bool_]:
-    """Which targets (M,) are near enough to joint 1, of an arm at places (M, 2) and yaws (K,), to be reached: (M, K).
+    """Which targets (M,) are within the reach from joint 1 of an arm at places (M, 2) and yaws (K,): (M, K).
 
-    Others are not asked: no point of an arm is farther from its joint 1 than its reach.
+    Other targets need no solve, as no point of an arm is farther from joint 1 than its reach.
     """
     arm = question.arm
-    foot = arm.link[0][:3, 3] @ np.swapaxes(rotation_about(2, turns), 1, 2) + [0.0, 0.0, question.z]
-    p = positions_of(question.task, question.targets)[target]
-    away = np.zeros((len(p), len(turns)))
-    for i in range(p.shape[1]):
-        away += ((p[:, i] - (place[:, i] if i < 2 else 0.0))[:, None] - foot[:, i]) ** 2
-    return np.asarray(away <= (arm.reach * (1.0 + BEYOND_REACH)) ** 2)
+    origin = arm.link[0][:3, 3] @ np.swapaxes(rotation_about(2, turns), 1, 2) + [0.0, 0.0, question.z]
+    points = positions_of(question.task, question.targets)[target]
+    squared_distance = np.zeros((len(points), len(turns)))
+    for i in range(points.shape[1]):
+        squared_distance += ((points[:, i] - (place[:, i] if i < 2 else 0.0))[:, None] - origin[:, i]) ** 2
+    return np.asarray(squared_distance <= (arm.reach * (1.0 + BEYOND_REACH)) ** 2)
 
 
 def _covered_arcs(first: NDArray[np.intp], length: NDArray[np.intp], count: int) -> NDArray[np.bool_]:
-    """Which places of circles of `count` lie on one of their arcs at least: (B, M), (B, M) -> (M, count)."""
-    until = _prefix_bits(count)
-    words = np.zeros((first.shape[1], until.shape[1]), np.uint64)
+    """Which of `count` places of M circles lie on at least one of B arcs: (B, M), (B, M) -> (M, count)."""
+    prefix = _prefix_bits(count)
+    words = np.zeros((first.shape[1], prefix.shape[1]), np.uint64)
     for begin, end in zip(first, first + length, strict=True):
-        words |= until.take(begin, axis=0) ^ until.take(end, axis=0)
+        words |= prefix.take(begin, axis=0) ^ prefix.take(end, axis=0)
     bits = np.unpackbits(words.astype("<u8").view(np.uint8), axis=1, count=count, bitorder="little")
     return bits.view(bool)
 
 
 @lru_cache(maxsize=4)
 def _prefix_bits(count: int) -> NDArray[np.uint64]:
-    """A bit for each place on the way from 0 to a place, of a circle gone round twice: (2 count + 1, words).
+    """Bits of the places passed on the way from 0 to each place, twice around the circle: (2 count + 1, words).
 
-    Places passed twice are 0 again, so that an arc is what its end has and its beginning has not, or the other way.
+    A place passed twice has bit 0 again, so that an arc is the exclusive or of the prefixes of its two ends.
     """
     once = pack_bits(np.arange(count) < np.arange(count + 1)[:, None])
     return np.concatenate([once, once[-1] ^ once[1:]])
 
 
 def _on_one_branch(question: PlaceQuestion, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """At which of some yaws (K,) one branch carries all targets."""
+    """At which of some yaws (K,) one branch follows all targets."""
     arm, K = question.arm, question.yaws
     if question.by_arcs:
-        s = isolated_branches(arm, targets_from(question, position, 0.0), question.task.name)
-        carries, low, high = place_branches.branch_ranges(s, s.valid)
-        allowed = carries & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
+        solutions = isolated_branches(arm, targets_from(question, position, 0.0), question.task.name)
+        is_complete, low, high = place_branches.branch_ranges(solutions, solutions.valid)
+        is_legal = is_complete & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
         first, length = place_branches.branch_arc(arm, low[:, 0], high[:, 0], K, question.sense)
-        places = (np.arange(K) - first[:, None]) % K < np.where(allowed, length, 0)[:, None]
-        return np.asarray(yaws & places.any(axis=0))
-    carried = np.zeros(K, bool)
+        is_on_arc = (np.arange(K) - first[:, None]) % K < np.where(is_legal, length, 0)[:, None]
+        return np.asarray(yaws & is_on_arc.any(axis=0))
+    is_followed = np.zeros(K, bool)
     for k in np.flatnonzero(yaws).tolist():
-        s, free = free_from(question, position, k * question.step, legal_only=False)
-        carries, low, high = place_branches.branch_ranges(s, free)
-        carried[k] = (carries & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
-    return carried
+        solutions, free = free_from(question, position, k * question.step, legal_only=False)
+        is_complete, low, high = place_branches.branch_ranges(solutions, free)
+        is_followed[k] = (is_complete & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
+    return is_followed
 
 
 def legal_from(question: PlaceQuestion, position: Array, turn: float) -> NDArray[np.bool_]:
@@ -330,27 +331,27 @@ def legal_from(question: PlaceQuestion, position: Array, turn: float) -> NDArray
 def free_from(
     question: PlaceQuestion, position: Array, turn: float, legal_only: bool = True
 ) -> tuple[Solutions, NDArray[np.bool_]]:
-    """The branches of all targets from one place, and which are free (N, B); legal_only: and within limits."""
-    # every posture of a family is an answer, but what one branch carries is another
-    find = question.solve if legal_only else isolated_branches
-    s = find(question.arm, targets_from(question, position, turn), question.task.name)
+    """The branches of all targets from one place, and which hit nothing (N, B), with legal_only also within limits."""
+    # following a path needs isolated branches, while any posture of a family reaches a target
+    solve = question.solve if legal_only else isolated_branches
+    s = solve(question.arm, targets_from(question, position, turn), question.task.name)
     legal = s.within_limits if legal_only else s.valid
     if question.arm.keep_out:
         legal = legal & s.clear
     if question.obstacles.keep_out and legal.any():
-        place, q = (float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan)
+        place, q = ((float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan))
         arm, joints = question.full_arm or HeldArm(question.arm, {})
         legal = legal & free_at_place(arm, question.obstacles, place, turn, unlock(arm, joints, q))
     return s, np.asarray(legal)
 
 
 def targets_from(question: PlaceQuestion, position: Array, turn: float) -> Array:
-    """The targets in the frame of an arm at a place (2,), or each from a place (N, 2) of its own, and a yaw."""
+    """The targets in the frame of an arm at one place (2,) or at a place for each target (N, 2), and a yaw."""
     return _turn_targets(question.task, _shift_targets(question, position), np.array(turn), np.cos(turn), np.sin(turn))
 
 
 def _shift_targets(question: PlaceQuestion, position: Array) -> Array:
-    """The targets in the frame of an arm at a position, or each from a position (N, 2), that is not turned."""
+    """The targets in the frame of an arm at one position, or one for each target (N, 2), with yaw 0."""
     targets = question.targets.copy()
     shift = np.concatenate([position, np.full((*position.shape[:-1], 1), question.z)], axis=-1)
     target_positions = positions_of(question.task, targets)
@@ -359,7 +360,7 @@ def _shift_targets(question: PlaceQuestion, position: Array) -> Array:
 
 
 def _turn_targets(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Array:
-    """Targets, in place, in a frame turned about z; turn, its cosine and sine: () or (N,)."""
+    """Transform targets in place to a frame turned about z; turn, its cosine and sine: () or (N,)."""
     if task.orientation == "full":
         _turn_back(targets[:, 0], targets[:, 1], c[..., None], s[..., None])
         return targets
@@ -371,5 +372,5 @@ def _turn_targets(task: Task, targets: Array, turn: Array, c: Array, s: Array) -
 
 
 def _turn_back(x: Array, y: Array, c: Array, s: Array) -> None:
-    """Coordinates x and y, in place, in a frame turned about z by the angle of that cosine and sine."""
+    """Transform coordinates x and y in place to a frame turned about z; c, s: cosine and sine of the angle."""
     x[...], y[...] = c * x + s * y, c * y - s * x

@@ -1,10 +1,10 @@
-"""Places of an arm whose joint 1 stands upright beside the base's axis, for targets that say nothing about azimuth.
+"""Places of an arm with a vertical joint 1 off the base's axis, for targets without a prescribed azimuth.
 
-A yaw then moves joint 1's foot, and each yaw is a question of its own; but what the joints behind it are asked depends
-on the target's distance from that foot alone. They are solved at radii so close to each other that between most of
-them nothing happens: a branch is there, or is missing by more than the radii are apart, and each joint is farther from
-its limits than it moves from radius to radius. What lies there is read off, with joint 1's azimuth. Elsewhere, near
-limits and where branches begin, end or meet, the place itself is asked: `by_radius` says where.
+A yaw then moves the foot of joint 1, so that each yaw is a different problem, but the other joints depend only on the
+target's distance from this foot. They are solved at closely spaced radii. Between two radii the answer is certain if a
+branch exists at both, or misses by more than the spacing, and if each joint is farther from its limits than it moves
+between the radii; then only the azimuth of joint 1 remains to be checked. All other places, near limits and where
+branches begin, end or meet, are undecided and need a solve (`by_radius`).
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from armkin.reachability.cell_answers import whole_turn
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-RADII = 256  # radii from joint 1's axis to the reach
-AT_ONCE = 16  # targets whose radii are solved together: they stay in the cache
-ROUNDING = 1e-6  # distance [rad, mm, reaches] from a limit, or from being there, below which a place is asked
+RADII = 256  # number of radii from the axis of joint 1 to the reach
+AT_ONCE = 16  # targets whose radii are solved together, so that their arrays fit the cache
+ROUNDING = 1e-6  # distance [rad, mm, reaches] from a limit or a solution below which a place is solved
 
 
 class Radii(NamedTuple):
-    """Branches of T targets in C cells between radii that are `spacing` [mm] apart.
+    """Branches of T targets in C cells between radii with a spacing [mm].
 
-    first: (T, B, C) joint 1 [rad] at azimuth 0. sure, open: (T, B, C) how far [rad] it may be from the middle of its
-    limits, so that the branch is legal anywhere in the cell, or may be; below 0: nowhere.
+    first: (T, B, C) joint 1 [rad] at azimuth 0. sure, open: (T, B, C) greatest offset [rad] of joint 1 from the middle
+    of its limits at which the branch is legal in the whole cell, or may be legal; below 0 for never.
     """
 
     spacing: float
@@ -54,7 +54,7 @@ class Feet(NamedTuple):
 
 
 class Answers(NamedTuple):
-    """What a target is answered from some of the feet, by their numbers (k,): reached, or to be asked (k,)."""
+    """The answers of a target for some feet, by their indices (k,): reached, or to be solved (k,)."""
 
     feet: NDArray[np.intp]
     reached: NDArray[np.bool_]
@@ -64,10 +64,10 @@ class Answers(NamedTuple):
 def by_radius(
     arm: Arm, task: str, targets: Array, place: Array, turns: Array
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]] | None:
-    """Which targets (N, m), at heights above the places, are reached from places (P, 2) at yaws (K,): (P, N, K), and
-    which of the rest have to be asked; None for an arm without a closed form."""
+    """Which targets (N, m) with z relative to the places are reached from places (P, 2) at yaws (K,): (P, N, K), and
+    which of the others have to be solved; None for an arm without a closed form."""
     N, K = len(targets), len(turns)
-    legal, open_cases = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
+    legal, undecided = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
     feet = _feet(arm, place, turns)
     for start in range(0, N, AT_ONCE):
         block = targets[start : start + AT_ONCE]
@@ -75,9 +75,9 @@ def by_radius(
             return None
         for i, target in enumerate(block):
             answers = _answers_from_feet(arm, radii.of_target(i), target, feet)
-            legal[start + i, answers.feet], open_cases[start + i, answers.feet] = answers.reached, answers.to_ask
+            legal[start + i, answers.feet], undecided[start + i, answers.feet] = answers.reached, answers.to_ask
     shape = (N, len(place), K)
-    return legal.reshape(shape).transpose(1, 0, 2), open_cases.reshape(shape).transpose(1, 0, 2)
+    return legal.reshape(shape).transpose(1, 0, 2), undecided.reshape(shape).transpose(1, 0, 2)
 
 
 def _feet(arm: Arm, place: Array, turns: Array) -> Feet:
@@ -92,81 +92,81 @@ def _feet(arm: Arm, place: Array, turns: Array) -> Feet:
 
 
 def _answers_from_feet(arm: Arm, branches: Radii, target: Array, feet: Feet) -> Answers:
-    """What is read off the target's branches, by each foot's distance and joint 1's azimuth there; elsewhere: none."""
+    """The answers from the branches of a target, by the distance of each foot and the azimuth of joint 1."""
     dx, dy = target[0] - feet.x, target[1] - feet.y
     every_cell = np.minimum(np.sqrt(dx * dx + dy * dy) * (1.0 / branches.spacing), RADII).astype(np.int32)
     is_open = np.append((branches.open >= 0.0).any(axis=0), False)
-    near = np.flatnonzero(is_open.take(every_cell))
-    cell = every_cell.take(near)
-    # joint 1, from the middle of its limits, for a branch that has it at 0 where the azimuth is 0
-    angle = np.arctan2(dy.take(near), dx.take(near))
-    angle -= feet.yaw.take(near)
+    in_reach = np.flatnonzero(is_open.take(every_cell))
+    cell = every_cell.take(in_reach)
+    # offset of joint 1 from the middle of its limits, for a branch where it is 0 at azimuth 0
+    angle = np.arctan2(dy.take(in_reach), dx.take(in_reach))
+    angle -= feet.yaw.take(in_reach)
     angle *= 1.0 if arm.link[0][2, 2] > 0 else -1.0
     angle -= _range_middle(arm, 0)
-    reached, possible = np.zeros(len(near), bool), np.zeros(len(near), bool)
-    for first, sure, most in zip(branches.first, branches.sure, branches.open, strict=True):
-        if (most < 0.0).all():
+    is_reached, is_possible = np.zeros(len(in_reach), bool), np.zeros(len(in_reach), bool)
+    for first, sure, greatest in zip(branches.first, branches.sure, branches.open, strict=True):
+        if (greatest < 0.0).all():
             continue
-        away = first.take(cell)
-        away += angle
-        away -= TURN * np.rint(away * (1.0 / TURN))
-        away = np.abs(away, out=away)
-        reached |= away <= sure.take(cell)
-        possible |= away <= most.take(cell)
-    return Answers(near, reached, possible & ~reached)
+        offset = first.take(cell)
+        offset += angle
+        offset -= TURN * np.rint(offset * (1.0 / TURN))
+        offset = np.abs(offset, out=offset)
+        is_reached |= offset <= sure.take(cell)
+        is_possible |= offset <= greatest.take(cell)
+    return Answers(in_reach, is_reached, is_possible & ~is_reached)
 
 
 def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     """The branches of some targets, solved at every radius."""
     T, count = len(targets), RADII + 1
-    apart = arm.reach * (1.0 + ROUNDING) / RADII
+    spacing = arm.reach * (1.0 + ROUNDING) / RADII
     goals = np.repeat(targets, count, axis=0)
     goals[:, :2] = arm.link[0][:2, 3]
-    goals[:, 0] += np.tile(np.arange(count) * apart, T)
+    goals[:, 0] += np.tile(np.arange(count) * spacing, T)
     if (blocks := columns(arm, goals, task, kept=True)) is None:
         return None
     parts = list(blocks)
     values = [np.concatenate([part.values[j] for part in parts], axis=1).reshape(-1, T, count) for j in range(arm.n)]
     miss = np.concatenate([part.miss for part in parts], axis=1).reshape(-1, T, count)
     valid = np.concatenate([part.valid for part in parts], axis=1).reshape(-1, T, count)
-    left = np.zeros(T * count, bool)
-    left[np.concatenate([part.rows.start + part.left for part in parts])] = True
-    # nan, of a branch that is nowhere near its target, is neither sure nor excluded: such cells are asked
+    unsolved = np.zeros(T * count, bool)
+    unsolved[np.concatenate([part.rows.start + part.left for part in parts])] = True
+    # nan, of a branch far from its target, is neither sure nor excluded, so that such cells are solved
     gap = np.sqrt(miss)
-    never = _lesser_end(gap) > _cell_motion(gap) + apart / arm.reach
-    sure = valid[..., :-1] & valid[..., 1:]
+    is_excluded = _lesser_end(gap) > _cell_motion(gap) + spacing / arm.reach
+    is_sure = valid[..., :-1] & valid[..., 1:]
     for j in range(1, arm.n):
         if not arm.prismatic[j] and whole_turn(arm, j):
             continue
-        room, moved = _limit_distance(arm, values[j], j), _cell_motion(values[j], not arm.prismatic[j])
-        sure &= _lesser_end(room) > moved
-        never |= _lesser_end(-room) > moved
-    doubted = left.reshape(T, count)
-    doubted = doubted[:, :-1] | doubted[:, 1:]
-    sure, never = sure & ~doubted, never & ~doubted
-    half, moved = _half_range(arm, 0), _cell_motion(values[0], True)
-    rows = (1, 0, 2)
+        room, moved = (_limit_distance(arm, values[j], j), _cell_motion(values[j], not arm.prismatic[j]))
+        is_sure &= _lesser_end(room) > moved
+        is_excluded |= _lesser_end(-room) > moved
+    is_doubted = unsolved.reshape(T, count)
+    is_doubted = is_doubted[:, :-1] | is_doubted[:, 1:]
+    is_sure, is_excluded = is_sure & ~is_doubted, is_excluded & ~is_doubted
+    half_range, moved = _half_range(arm, 0), _cell_motion(values[0], True)
+    axes = (1, 0, 2)
     return Radii(
-        apart,
-        values[0][..., :-1].transpose(rows),
-        np.where(sure, half - moved, -1.0).transpose(rows),
-        np.where(never, -1.0, np.where(np.isnan(moved), np.inf, half + moved)).transpose(rows),
+        spacing,
+        values[0][..., :-1].transpose(axes),
+        np.where(is_sure, half_range - moved, -1.0).transpose(axes),
+        np.where(is_excluded, -1.0, np.where(np.isnan(moved), np.inf, half_range + moved)).transpose(axes),
     )
 
 
 def _lesser_end(ends: Array) -> Array:
-    """The lesser of what stands at a cell's two ends."""
+    """The smaller one of the values at both ends of each cell."""
     return np.minimum(ends[..., :-1], ends[..., 1:])
 
 
 def _cell_motion(value: Array, turns: bool = False) -> Array:
-    """How far a value may move within a cell: as far as in that cell or in those beside it."""
+    """Bound of the change of a value within a cell: the greatest change in the cell and its neighbours."""
     step = np.diff(value, axis=-1)
     if turns:
         step -= TURN * np.rint(step / TURN)
     step = np.abs(step) + ROUNDING
-    wide = np.concatenate([step[..., :1], step, step[..., -1:]], axis=-1)
-    return np.asarray(np.maximum(np.maximum(wide[..., :-2], wide[..., 2:]), step))
+    padded = np.concatenate([step[..., :1], step, step[..., -1:]], axis=-1)
+    return np.asarray(np.maximum(np.maximum(padded[..., :-2], padded[..., 2:]), step))
 
 
 def _range_middle(arm: Arm, joint: int) -> float:
@@ -178,8 +178,8 @@ def _half_range(arm: Arm, joint: int) -> float:
 
 
 def _limit_distance(arm: Arm, value: Array, joint: int) -> Array:
-    """How far from its limits a joint is; negative outside."""
+    """Distance of a joint from its limits; negative outside."""
     if arm.prismatic[joint]:
         return np.asarray(np.minimum(value - arm.lower[joint], arm.upper[joint] - value))
-    away = value - _range_middle(arm, joint)
-    return np.asarray(_half_range(arm, joint) - np.abs(away - TURN * np.rint(away / TURN)))
+    offset = value - _range_middle(arm, joint)
+    return np.asarray(_half_range(arm, joint) - np.abs(offset - TURN * np.rint(offset / TURN)))

@@ -1,8 +1,8 @@
-"""Where an arm is asked: sectors of rings about joint 1's axis, and the orientations in each.
+"""Cells of a reach map: sectors of rings about the axis of joint 1, and the orientations in each cell.
 
-A cell (i, j, k) stands at r = (i + 1/2) grid, z = j grid, azimuth 360 k / M of the reach frame, whose z axis is
-joint 1's; its orientations stand in the reach frame turned by the azimuth. So joint 1's turn takes a cell to the next
-one of its ring, orientations and all.
+Cell (i, j, k) is at r = (i + 1/2) grid, z = j grid, azimuth 360 k / M in the reach frame, whose z axis is the axis of
+joint 1. Its orientations are given in the reach frame turned by the azimuth, so that a turn of joint 1 maps a cell and
+its orientations to the next cell of the ring.
 """
 
 from __future__ import annotations
@@ -25,15 +25,15 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-MAX_CELLS = 10**9  # cells of a map, at most
-MAX_ORIENTATIONS = 10**6  # orientations of a cell, at most
+MAX_CELLS = 10**9  # most cells of a map
+MAX_ORIENTATIONS = 10**6  # most orientations of a cell
 GOLDEN = math.pi * (3.0 - math.sqrt(5.0))  # golden angle [rad]
-STRAIGHT = 1e-9  # sine between axes that are parallel
+STRAIGHT = 1e-9  # sine of the angle up to which axes count as parallel
 
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """What is asked of an arm: lengths in mm, counts of azimuths, directions and rolls."""
+    """The grid of a reach map: cell size [mm], and numbers of azimuths, directions and rolls."""
 
     arm: Arm
     step: float
@@ -85,21 +85,21 @@ class Grid:
 
     @cached_property
     def rings(self) -> Array:
-        """(R, 2) i and j of every ring within the reach, sorted."""
-        most = self.arm.reach**2 * (1 + 1e-9) / self.step**2
-        top = math.isqrt(int(most)) + 1 if self.task.position == 3 else 0
-        i, j = np.meshgrid(np.arange(math.isqrt(int(most)) + 1), np.arange(-top, top + 1), indexing="ij")
-        inside = (i + 0.5) ** 2 + j**2 <= most
-        return np.stack([i[inside], j[inside]], axis=1)
+        """Indices i and j of every ring within the reach, sorted: (R, 2)."""
+        greatest = self.arm.reach**2 * (1 + 1e-9) / self.step**2
+        top = math.isqrt(int(greatest)) + 1 if self.task.position == 3 else 0
+        i, j = np.meshgrid(np.arange(math.isqrt(int(greatest)) + 1), np.arange(-top, top + 1), indexing="ij")
+        in_reach = (i + 0.5) ** 2 + j**2 <= greatest
+        return np.stack([i[in_reach], j[in_reach]], axis=1)
 
     @cached_property
     def rolls_count(self) -> int:
-        """Turns about the tool's z axis that are asked."""
+        """Number of turns about the tool's z axis."""
         return self.rolls if self.task.name in ("pose", "xyz_pitch_roll", "xyz_roll") else 1
 
     @cached_property
     def directions_count(self) -> int:
-        """Directions, pitches or yaws that are asked."""
+        """Number of directions, pitches or yaws."""
         return 1 if self.tool_down or self.task.name in ("xy", "xyz", "xyz_roll") else self.directions
 
     @property
@@ -109,7 +109,7 @@ class Grid:
 
     @property
     def down_is_apart(self) -> bool:
-        """Whether `tool_down` does not turn with the cells: joint 1 is not along z of the frame of targets."""
+        """Whether `tool_down` has another direction in each cell, as joint 1 is not along the z axis of targets."""
         return self.tool_down and not _is_pitch(self.task) and abs(self.frame[2, 2]) < 1 - STRAIGHT
 
     @cached_property
@@ -130,13 +130,13 @@ class Grid:
         return np.asarray(np.arange(self.directions_count) * (2 * math.pi / self.directions_count), dtype=float)
 
     def positions(self, rings: Array, azimuth: Array) -> Array:
-        """Cells in the frame of targets: rings (..., 2), azimuth (...) [rad] -> (..., 3)."""
+        """Centres of cells in the frame of targets: rings (..., 2), azimuth (...) [rad] -> (..., 3)."""
         r, z = (rings[..., 0] + 0.5) * self.step, rings[..., 1] * self.step
         local = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z + 0.0 * azimuth], axis=-1)
         return np.asarray(self.frame[:3, 3] + local @ self.frame[:3, :3].T)
 
     def targets(self, rings: Array, azimuth: Array, direction: NDArray[np.intp], roll: Array) -> Array:
-        """What `ik` is asked: rings (S, 2), azimuth, roll (S,) [rad], direction (S,) index -> (S, ...)."""
+        """Targets of `ik`: rings (S, 2), azimuth, roll (S,) [rad], direction (S,) index -> (S, ...)."""
         p = self.positions(rings, azimuth)
         if self.task.orientation == "full":
             T = np.zeros((len(p), 4, 4))
@@ -156,7 +156,7 @@ class Grid:
         return np.concatenate(parts, axis=1)
 
     def _cell_frames(self, azimuth: Array) -> Array:
-        """The cell's frame in the frame of targets: (S, 3, 3)."""
+        """Frames of cells in the frame of targets: (S, 3, 3)."""
         if self.down_is_apart:
             return np.broadcast_to(np.eye(3), (len(azimuth), 3, 3))
         return np.asarray(self.frame[:3, :3] @ rotation_about(2, azimuth))

@@ -1,4 +1,4 @@
-"""`armkin.reach`: where an arm reaches, with which share of orientations, by how many branches, and how well."""
+"""`armkin.reach`: a map of reached positions, with share of orientations, number of branches, and measures."""
 
 from __future__ import annotations
 
@@ -31,11 +31,11 @@ from armkin.reachability.reach_cells import Grid
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-CHUNK_SOLVES = 40_000  # A chunk holds so many solves: about a second with all measures and a closed form.
-ELIMINATION_COST = 40  # A solve by elimination counts as so many by a closed form.
-FAMILY_COST = 1_000  # A solve counts as so many where the answers of a pose are curves.
-BLOCK_SOLVES = 2_048  # So many solves are made at once: their words stay in the cache.
-KEPT_CELLS = 5_000_000  # A result with a file still holds so many cells as arrays.
+CHUNK_SOLVES = 40_000  # solves of a chunk: about a second with all measures and a closed form
+ELIMINATION_COST = 40  # cost of a solve by elimination, in solves by a closed form
+FAMILY_COST = 1_000  # cost of a solve whose answers are curves, in solves by a closed form
+BLOCK_SOLVES = 2_048  # solves made together, so that their words fit the cache
+KEPT_CELLS = 5_000_000  # most cells that a result holds as arrays if there is a file
 UNITS = {
     "x_mm": "mm", "y_mm": "mm", "z_mm": "mm", "share": "1", "share_any": "1", "branches": "1", "single": "1",
     "manipulability": "mm^k", "limit_margin": "1", "step_error_mm": "mm",
@@ -88,7 +88,7 @@ class Reach:
 
 
 class RingChunk(NamedTuple):
-    """Some rings, by their number."""
+    """Some rings, with the index of the chunk."""
 
     number: int
     rings: Array
@@ -167,7 +167,7 @@ def reach(
 
 
 def chunks(question: CellQuestion) -> Iterator[RingChunk]:
-    """All rings, some at a time; the same ones for every engine."""
+    """All rings in chunks, the same for every engine."""
     rings = question.grid.rings
     rings_each = max(CHUNK_SOLVES // _cost(question) // question.solves_a_ring, 1)
     for number, start in enumerate(range(0, len(rings), rings_each)):
@@ -183,7 +183,7 @@ def _cost(question: CellQuestion) -> int:
 
 
 def answer_chunk(question: CellQuestion, chunk: RingChunk) -> tuple[int, Table]:
-    """The columns of a chunk: a pure function, wherever it runs."""
+    """The columns of a chunk; a pure function, whose result does not depend on the engine."""
     grid, M = question.grid, question.grid.azimuths
     rings_each = max(BLOCK_SOLVES // question.solves_a_ring, 1)
     parts = [cell_columns(question, chunk.rings[i : i + rings_each]) for i in range(0, len(chunk.rings), rings_each)]
@@ -197,7 +197,7 @@ def answer_chunk(question: CellQuestion, chunk: RingChunk) -> tuple[int, Table]:
 
 
 class _Run:
-    """A map that is made: its chunks, its file, and its sums."""
+    """The making of a map: its chunks, its file, and its sums."""
 
     def __init__(
         self, question: CellQuestion, out: str | None, engine: Engine, progress: Callable[[int], None] | None
@@ -215,21 +215,21 @@ class _Run:
             self.parts = Parts(out, _dependencies(question))
 
     def answer_all(self, all_chunks: list[RingChunk]) -> dict[str, Array]:
-        """Answer all chunks; the columns, unless they are in a file and too many."""
+        """Compute all chunks and return the columns; empty if they are in a file and too many."""
         kept_tables: dict[int, Table] = {}
         cells = sum(len(chunk.rings) for chunk in all_chunks) * self.question.grid.azimuths
-        keep = self.parts is None or cells <= KEPT_CELLS
+        keeps_tables = self.parts is None or cells <= KEPT_CELLS
         with kept_chunks.hold_parts(self.parts, len(all_chunks)):
             for number, columns in kept_chunks.chunk_tables(
                 self.engine, answer_chunk, self.question, all_chunks, self.parts
             ):
                 self._count(all_chunks[number], columns)
-                if keep:
+                if keeps_tables:
                     kept_tables[number] = columns
             if self.out is not None:
                 self._write(len(all_chunks), kept_tables)
         tables = [kept_tables[number] for number in sorted(kept_tables)]
-        return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keep else {}
+        return {name: np.concatenate([np.asarray(t[name]) for t in tables]) for name in UNITS} if keeps_tables else {}
 
     def _count(self, chunk: RingChunk, table: Table) -> None:
         grid = self.question.grid
@@ -264,7 +264,7 @@ class _Run:
 
 
 def _dependencies(question: CellQuestion) -> dict[str, Any]:
-    """What the columns depend on."""
+    """The inputs that the columns depend on."""
     grid, arm = question.grid, question.grid.arm
     names = ("step", "azimuths", "directions", "rolls", "tool_down")
     settings = {("grid" if name == "step" else name): getattr(grid, name) for name in names}

@@ -1,4 +1,4 @@
-"""Joint values that cover an arm's range: random or a grid, chunk by chunk and repeatable."""
+"""Joint values that cover the range of an arm, random or on a grid, in repeatable chunks."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 CHUNK = 1 << 16  # samples in memory at once
-MAX_SAMPLES = 10**10  # samples of a survey, at most: about an hour on a desktop computer
+MAX_SAMPLES = 10**10  # most samples of a survey, about an hour on a desktop computer
 
 
 def sampled_range(arm: Arm) -> tuple[Array, Array]:
-    """Lower and upper end of what is sampled: (n,) twice [rad | mm].
+    """Lower and upper end of the sampled range: (n,) twice [rad | mm].
 
-    The limits; for an unlimited revolute joint one turn, -180 to 180 degrees. An unlimited
-    prismatic joint has no finite range and is an error.
+    The ends are the limits, or -180 and 180 degrees for an unlimited revolute joint. An unlimited prismatic joint
+    has no finite range and is an error.
     """
-    endless = [
+    unlimited = [
         name
         for name, slides, low, high in zip(arm.joint_names, arm.prismatic, arm.lower, arm.upper, strict=True)
         if slides and not (math.isfinite(low) and math.isfinite(high))
     ]
-    if endless:
-        raise UsageError(f"prismatic joint {endless[0]} of {arm.name} has no limits; give it limits: [mm, mm]")
+    if unlimited:
+        raise UsageError(f"prismatic joint {unlimited[0]} of {arm.name} has no limits; give it limits: [mm, mm]")
     low = np.where(np.isfinite(arm.lower), arm.lower, -math.pi)
     high = np.where(np.isfinite(arm.upper), arm.upper, math.pi)
     return low, high
@@ -39,7 +39,7 @@ def sampled_range(arm: Arm) -> tuple[Array, Array]:
 
 @dataclass(frozen=True)
 class Random:
-    """`count` poses, every joint uniform and independent over its range."""
+    """`count` random postures, with each joint uniform and independent over its range."""
 
     arm: Arm
     count: int
@@ -57,14 +57,14 @@ class Random:
 
     @property
     def parts(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return -(-self.count // CHUNK)
 
     def part(self, number: int) -> Array:
-        """The poses of a chunk, (up to CHUNK, n) [rad | mm], the same ones at every call and wherever it runs."""
+        """The postures of a chunk, (up to CHUNK, n) [rad | mm], the same at every call and on every engine."""
         start = number * CHUNK
         bits = np.random.PCG64(self.seed)
-        bits.advance(start * self.arm.n)  # a number takes one step of the generator
+        bits.advance(start * self.arm.n)  # each random number takes one step of the generator
         low, high = sampled_range(self.arm)
         shape = (min(CHUNK, self.count - start), self.arm.n)
         return np.asarray(low + (high - low) * np.random.Generator(bits).random(shape))
@@ -74,8 +74,8 @@ class Random:
 class JointGrid:
     """Every combination of evenly spaced joint values, the last joint changing fastest.
 
-    Both limits are on the grid. An unlimited joint's turn is half open: -180 is on it, 180 is not.
-    A single point stands in the middle of the range.
+    Both limits are on the grid. For an unlimited joint, -180 degrees is on the grid and 180 degrees is not. A single
+    point is in the middle of the range.
     """
 
     arm: Arm
@@ -95,27 +95,27 @@ class JointGrid:
 
     @property
     def count(self) -> int:
-        """Number of poses."""
+        """Number of postures."""
         return math.prod(self.points)
 
     @property
     def parts(self) -> int:
-        """How many chunks there are."""
+        """Number of chunks."""
         return -(-self.count // CHUNK)
 
     def part(self, number: int) -> Array:
-        """The poses of a chunk, (up to CHUNK, n) [rad | mm]."""
+        """The postures of a chunk, (up to CHUNK, n) [rad | mm]."""
         low, high = sampled_range(self.arm)
         step = np.zeros(self.arm.n)
         first = low.copy()
-        for i, k in enumerate(self.points):
-            turn = not (np.isfinite(self.arm.lower[i]) and np.isfinite(self.arm.upper[i]))
-            if k == 1:
-                first[i] = 0.5 * (low[i] + high[i])
+        for joint, points in enumerate(self.points):
+            is_unlimited = not (np.isfinite(self.arm.lower[joint]) and np.isfinite(self.arm.upper[joint]))
+            if points == 1:
+                first[joint] = 0.5 * (low[joint] + high[joint])
             else:
-                step[i] = (high[i] - low[i]) / (k if turn else k - 1)
-        flat = np.arange(number * CHUNK, min((number + 1) * CHUNK, self.count))
-        index = np.stack(np.unravel_index(flat, self.points), axis=-1)
+                step[joint] = (high[joint] - low[joint]) / (points if is_unlimited else points - 1)
+        positions = np.arange(number * CHUNK, min((number + 1) * CHUNK, self.count))
+        index = np.stack(np.unravel_index(positions, self.points), axis=-1)
         return np.asarray(np.minimum(first + step * index, high))
 
 
@@ -123,5 +123,5 @@ Sampling = Random | JointGrid
 
 
 def joint_grid(arm: Arm, points: Sequence[int]) -> JointGrid:
-    """A grid of so many points a joint; a single number counts for every joint."""
+    """A grid with a number of points for each joint; a single number counts for every joint."""
     return JointGrid(arm, tuple(points) * arm.n if len(points) == 1 else tuple(points))

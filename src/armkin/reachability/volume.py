@@ -1,25 +1,25 @@
-"""Volume or area of what the tool's tip can reach, with an error.
+"""Volume or area of the positions that the tool's tip can reach, with an error.
 
-The first joint's motion is exact: it sweeps the tip along a circle about its axis, or along a line.
-What is left is a section through the first joint's axis, (r^2/2, z) for a revolute joint, which the
-other joints fill; it is cut into cells of equal area, so that a cell stands for the volume
+The motion of the first joint is exact: it sweeps the tip along a circle about its axis, or along a line.
+The other joints fill a section through the axis of the first joint, with coordinates (r^2/2, z) for a
+revolute joint. The section is divided into cells of equal area, so that a cell represents the volume
 
     cell area x length swept at the cell,
 
-the length being an angle for a revolute joint (Pappus), or mm for a prismatic one. Every cell keeps
-the interval of where along the sweep its tips start (one interval for each stretch as long as the
-sweep itself: the union of the swept stretches is then exact, also where the arm reaches the same
-place from the front and over the shoulder).
+where the length is an angle for a revolute joint (Pappus), or in mm for a prismatic one. Every cell
+stores the interval of the starts of its tips along the sweep, one interval for each stretch as long as
+the sweep. The union of the swept stretches is then exact, also where the arm reaches the same place
+from the front and over the shoulder.
 
-Cells are found by random sampling, with a share of the joints set exactly on their limits, followed
-by growth from the cells that were found last (Gaussian growth: Peidro, Reinoso, Gil, Marin, Paya,
+Random sampling finds the cells, with a share of the joints exactly at their limits, followed by growth
+from the cells that were found last (Gaussian growth: Peidro, Reinoso, Gil, Marin, Paya,
 An improved Monte Carlo method based on Gaussian growth to calculate the workspace of robots,
 Engineering Applications of Artificial Intelligence 64, 2017).
 
-A cell on the border is reached in part. Counting all such cells gives an upper figure, counting none
-a lower one; as a border falls anywhere in its cells, the middle of the two is taken. The error is half
-of what is between the two, plus how far the figure moves when the cells are merged to twice their
-size, which shows what the samples have missed. Of all sizes the one with the least error is taken.
+A cell on the border is reached in part. Counting all such cells gives an upper bound, counting none a
+lower bound, and the result is their mean, as a border may be anywhere in its cells. The error is half
+the difference of the bounds, plus the change of the result if the cells are merged to twice their size,
+which shows how much the samples have missed. The result comes from the cell size with the least error.
 """
 
 from __future__ import annotations
@@ -40,19 +40,19 @@ if TYPE_CHECKING:
 
 _SIDE = 512  # cells along each side of the section of an arm in space
 _LINE = 1 << 14  # cells of a planar arm's section, which is a line
-_STRETCHES = 64  # stretches along the sweep, at most
-_UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of samples that vary them
+_STRETCHES = 64  # most stretches along the sweep
+_UNIFORM, _GROWN = 24, 24  # chunks of random samples, and of variations of them
 _CHUNK = 1 << 16  # samples of a chunk
-_MIN_CHUNK = 1 << 11  # samples of a chunk, at least
-_ALL = 5_000  # samples of a survey from which on its volume is worth the whole effort
-_POOL = 1 << 14  # poses that are varied
-_OVERSHOOT = 0.04  # share of the range: samples beyond a limit are set on it
-_MARGIN = 0.02  # share of the section's size around what a first look finds
+_MIN_CHUNK = 1 << 11  # fewest samples of a chunk
+_ALL = 5_000  # samples of a survey from which on its volume gets the full number of postures
+_POOL = 1 << 14  # most postures that are varied
+_OVERSHOOT = 0.04  # share of the range by which samples exceed a limit before they are clipped to it
+_MARGIN = 0.02  # margin around the first samples, as a share of the size of the section
 
 
 @dataclass(frozen=True)
 class Extent:
-    """A volume or an area and how far it may be off."""
+    """A volume or an area, and its error."""
 
     dimensions: int  # 3: volume [mm3]; 2: area [mm2]
     value: float
@@ -115,7 +115,7 @@ def _least_error_level(cells: _Cells) -> _Level:
 
 
 def tip_freedoms(arm: Arm) -> tuple[Array | None, int]:
-    """The normal of the plane that the tip moves in (None: space), and the tip's freedoms."""
+    """The normal of the plane in which the tip moves (None: space), and the freedoms of the tip."""
     low, high = sampled_range(arm)
     q = low + (high - low) * np.random.default_rng(1).random((64, arm.n))
     J = jacobian(arm, q)[:, :3] * (high - low)  # [mm] over a joint's whole range
@@ -127,7 +127,7 @@ def tip_freedoms(arm: Arm) -> tuple[Array | None, int]:
 
 
 class _Section:
-    """Tips with the first joint at 0, seen from its axis: where in the section, and where along the sweep."""
+    """Coordinates of tips with the first joint at 0: the place in the section, and the place along the sweep."""
 
     def __init__(self, arm: Arm, normal: Array | None) -> None:
         self.arm = arm
@@ -137,7 +137,7 @@ class _Section:
         self.closed = self.revolute and self.sweep >= 2 * math.pi * (1 - 1e-12)
         to_axis = np.linalg.inv(arm.link[0])
         self._R, self._p = to_axis[:3, :3], to_axis[:3, 3]
-        # In a plane the section is a line: the radius, or across a first slide.
+        # the section of a planar arm is a line: the radius, or the direction normal to a first prismatic joint
         self.flat = normal is not None
         across = np.array([1.0, 0.0, 0.0])
         if normal is not None and not self.revolute:
@@ -145,7 +145,7 @@ class _Section:
         self._across = across
 
     def outer_corners(self) -> tuple[Array, Array]:
-        """Corners of a section that no tip can leave."""
+        """Corners of a section that contains all tips."""
         reach = self.arm.reach * (1 + 1e-9)
         low, high = np.array([-reach, -reach]), np.array([reach, reach])
         if self.revolute:
@@ -165,19 +165,19 @@ class _Section:
 
 
 class _Cells:
-    """The section cut into cells, and what was found in each."""
+    """The cells of the section, and the starts found in each."""
 
     def __init__(self, section: _Section, low: Array, high: Array, side: int) -> None:
         self.section = section
         reach = math.pi if section.revolute else section.arm.reach
-        # Stretches no longer than the sweep: two starts in one are always joined by what they sweep.
+        # stretches are no longer than the sweep, so that the sweeps of two starts in a stretch always overlap
         count = 1 if section.closed else min(_STRETCHES, math.ceil(2 * reach / section.sweep))
         self.first_start, self.stretch, self.stretches = -reach, 2 * reach / count, count
         if len(low) == 2:
             side = 1 << (min(side, math.isqrt((1 << 20) // count)).bit_length() - 1)
         self.shape = (side,) * len(low)
         self.low, self.high = low, high
-        # Not below what floats can tell apart: an arm may hardly move.
+        # at least the spacing of floats, as an arm may hardly move
         self.size = np.maximum((high - low) / side, np.spacing(np.maximum(np.abs(low), np.abs(high))))
         cells = math.prod(self.shape) * count
         self.start_low = np.full(cells, np.inf)
@@ -186,24 +186,24 @@ class _Cells:
         self._notable = self.stretch / 64
 
     def add(self, q: Array) -> NDArray[np.bool_]:
-        """Enter poses; which of them found something new."""
+        """Enter postures; returns which of them extended an interval."""
         place, start = self.section.place(q)
-        flat = np.zeros(len(q), dtype=np.int64)
-        for k, x in enumerate(place):
-            self.least[k], self.most[k] = min(self.least[k], x.min()), max(self.most[k], x.max())
-            index = ((x - self.low[k]) / self.size[k]).astype(np.int64)
-            flat = flat * self.shape[k] + np.clip(index, 0, self.shape[k] - 1)
+        cell = np.zeros(len(q), dtype=np.int64)
+        for axis, x in enumerate(place):
+            self.least[axis], self.most[axis] = min(self.least[axis], x.min()), max(self.most[axis], x.max())
+            index = ((x - self.low[axis]) / self.size[axis]).astype(np.int64)
+            cell = cell * self.shape[axis] + np.clip(index, 0, self.shape[axis] - 1)
         if self.stretches > 1:
-            part = ((start - self.first_start) / self.stretch).astype(np.int64)
-            flat = flat * self.stretches + np.clip(part, 0, self.stretches - 1)
-        is_new = start < self.start_low[flat] - self._notable
-        is_new |= start > self.start_high[flat] + self._notable
-        np.minimum.at(self.start_low, flat, start)
-        np.maximum.at(self.start_high, flat, start)
+            stretch = ((start - self.first_start) / self.stretch).astype(np.int64)
+            cell = cell * self.stretches + np.clip(stretch, 0, self.stretches - 1)
+        is_new = start < self.start_low[cell] - self._notable
+        is_new |= start > self.start_high[cell] + self._notable
+        np.minimum.at(self.start_low, cell, start)
+        np.maximum.at(self.start_high, cell, start)
         return np.asarray(is_new)
 
     def merge_cells(self) -> _Cells | None:
-        """What was found, in cells twice as wide along every side; None from 32 cells a side down."""
+        """Cells of twice the size with the same starts; None for 32 cells or fewer along a side."""
         if self.shape[0] <= 32:
             return None
         coarse = _Cells(self.section, self.low, self.high, self.shape[0] // 2)
@@ -218,48 +218,49 @@ class _Cells:
         low = self.start_low.reshape(-1, self.stretches)
         high = self.start_high.reshape(-1, self.stretches)
         sweep = self.section.sweep
-        before = np.full(len(low), -np.inf)  # end of the starts seen so far
+        last_end = np.full(len(low), -np.inf)  # end of the previous interval of starts
         first = np.full(len(low), np.inf)
         gaps = np.zeros(len(low))
-        for k in range(self.stretches):
-            occupied = np.isfinite(low[:, k])
-            gap = np.where(occupied, low[:, k], 0.0) - np.where(np.isfinite(before), before, np.inf) - sweep
+        for stretch in range(self.stretches):
+            occupied = np.isfinite(low[:, stretch])
+            gap = np.where(occupied, low[:, stretch], 0.0) - np.where(np.isfinite(last_end), last_end, np.inf) - sweep
             gaps += np.where(occupied, np.maximum(gap, 0.0), 0.0)
-            first = np.where(np.isfinite(first), first, low[:, k])
-            before = np.where(occupied, high[:, k], before)
+            first = np.where(np.isfinite(first), first, low[:, stretch])
+            last_end = np.where(occupied, high[:, stretch], last_end)
         occupied = np.isfinite(first)
-        first, before = np.where(occupied, first, 0.0), np.where(occupied, before, 0.0)
-        if self.section.revolute:  # a circle: what is not in a gap, the last one reaching around to the first
-            total = 2 * math.pi - gaps - np.maximum(first + 2 * math.pi - before - sweep, 0.0)
+        first, last_end = np.where(occupied, first, 0.0), np.where(occupied, last_end, 0.0)
+        # the circle without its gaps, of which one lies between the last and the first interval
+        if self.section.revolute:
+            total = 2 * math.pi - gaps - np.maximum(first + 2 * math.pi - last_end - sweep, 0.0)
         else:
-            total = before - first + sweep - gaps
+            total = last_end - first + sweep - gaps
         return np.where(occupied, total, 0.0).reshape(self.shape)
 
     def bracket(self) -> tuple[float, float]:
-        """Lower and upper figure of the volume or area."""
-        most = self.swept_lengths()
-        # At r = 0 there is no border: the section ends there because the axis does.
-        axis = "edge" if self.section.revolute and self.low[0] == 0.0 else "constant"
-        least = most
-        for k in range(most.ndim):
-            sides: list[tuple[int, int]] = [(0, 0)] * most.ndim
+        """Lower and upper bound of the volume or area."""
+        lengths = self.swept_lengths()
+        # r = 0 is the axis and no border of the reach
+        axis_mode = "edge" if self.section.revolute and self.low[0] == 0.0 else "constant"
+        inner_lengths = lengths
+        for k in range(lengths.ndim):
+            sides: list[tuple[int, int]] = [(0, 0)] * lengths.ndim
             sides[k] = (1, 0)
-            padded = np.pad(least, sides, mode=axis if k == 0 else "constant")  # type: ignore[call-overload]
+            padded = np.pad(inner_lengths, sides, mode=axis_mode if k == 0 else "constant")  # type: ignore[call-overload]
             sides[k] = (0, 1)
             padded = np.pad(padded, sides)
             n = self.shape[k]
-            least = np.minimum(
+            inner_lengths = np.minimum(
                 np.minimum(padded.take(range(n), k), padded.take(range(1, n + 1), k)),
                 padded.take(range(2, n + 2), k),
             )
         cell = float(np.prod(self.size))
-        return float(least.sum()) * cell, float(most.sum()) * cell
+        return float(inner_lengths.sum()) * cell, float(lengths.sum()) * cell
 
 
 def _fill_cells(cells: _Cells, rng: np.random.Generator, uniform: int, grown: int, size: int) -> None:
-    """Sample the other joints: at random first, then around the poses that last found something new."""
+    """Sample the other joints, first at random, then around the postures that last extended an interval."""
     arm, low, high = cells.section.arm, cells.section.low, cells.section.high
-    limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
+    is_limited = np.isfinite(arm.lower) & np.isfinite(arm.upper)
     width = high - low
     pool = np.empty((0, arm.n))
     for chunk in range(uniform + grown):
@@ -269,7 +270,7 @@ def _fill_cells(cells: _Cells, rng: np.random.Generator, uniform: int, grown: in
             seeds = pool[rng.integers(len(pool), size=size)]
             step = 10.0 ** rng.uniform(-4.0, -0.5, (size, 1))
             q = seeds + step * width * rng.standard_normal((size, arm.n))
-        q = np.where(limited, np.clip(q, low, high), q)
+        q = np.where(is_limited, np.clip(q, low, high), q)
         q[:, 0] = 0.0
         is_new = cells.add(q)
         pool = np.concatenate([q[is_new], pool])[:_POOL]

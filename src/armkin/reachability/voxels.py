@@ -1,7 +1,7 @@
-"""Cubic voxels for pictures, from cells that are sectors of rings: a voxel takes the cell that its centre lies in.
+"""Cubic voxels for pictures of cells that are sectors of rings; a voxel shows the cell that contains its centre.
 
-Voxels are as large as the cells' grid. Their centres stand at ((a + 1/2) grid, b grid, c grid) of the reach frame, so
-that those of the plane y = 0 stand at the centres of cells.
+The edges of voxels have the length of the grid. Their centres are at ((a + 1/2) grid, b grid, c grid) in the reach
+frame, so that centres in the plane y = 0 are centres of cells.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Layer(NamedTuple):
-    """Voxels of a plane: places (V, 2) along its axes, in steps of the grid; row (V,): the cell of each.
+    """Voxels of a plane: places (V, 2) along its axes, in steps of the grid; row (V,): index of the cell.
 
     centres: (V, 3) in the reach frame [mm].
     """
@@ -29,7 +29,7 @@ class Layer(NamedTuple):
     centres: Array
 
     def table(self, column: Array) -> Array:
-        """A column of the cells as an image (rows upwards, columns to the right); nan where there is no cell."""
+        """A column of the cells as an image (rows upwards, columns to the right); nan without a cell."""
         across, up = (self.places - self.places.min(axis=0)).T
         image = np.full((up.max() + 1, across.max() + 1), np.nan)
         image[up, across] = column[self.row]
@@ -51,27 +51,27 @@ def level_layer(grid: Grid, c: int) -> Layer:
 
 
 def rows_at(grid: Grid, points: Array) -> NDArray[np.intp]:
-    """The cell that each point of the reach frame (N, 3) lies in, by its row; -1: in none."""
+    """The index of the cell that contains each point of the reach frame (N, 3); -1 for none."""
     x, y, z = points.T
     i = np.floor(np.hypot(x, y) / grid.step).astype(np.intp)
     j = np.rint(z / grid.step).astype(np.intp)
     k = np.rint(np.arctan2(y, x) * (grid.azimuths / TURN)).astype(np.intp) % grid.azimuths
     rings = grid.rings.astype(np.intp)
-    most_i, low = rings[:, 0].max(), rings[:, 1].min()
-    ring = np.full((most_i + 1, rings[:, 1].max() - low + 1), -1, np.intp)
-    ring[rings[:, 0], rings[:, 1] - low] = np.arange(len(rings))
-    inside = (i <= most_i) & (j >= low) & (j - low < ring.shape[1])
-    ring_numbers = np.where(inside, ring[np.where(inside, i, 0), np.where(inside, j - low, 0)], -1)
+    last_i, lowest_j = rings[:, 0].max(), rings[:, 1].min()
+    ring = np.full((last_i + 1, rings[:, 1].max() - lowest_j + 1), -1, np.intp)
+    ring[rings[:, 0], rings[:, 1] - lowest_j] = np.arange(len(rings))
+    is_inside = (i <= last_i) & (j >= lowest_j) & (j - lowest_j < ring.shape[1])
+    ring_numbers = np.where(is_inside, ring[np.where(is_inside, i, 0), np.where(is_inside, j - lowest_j, 0)], -1)
     return np.asarray(np.where(ring_numbers < 0, -1, ring_numbers * grid.azimuths + k))
 
 
 def _square_indices(grid: Grid) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    most = int(grid.rings[:, 0].max()) + 1
-    a, b = np.meshgrid(np.arange(-most, most), np.arange(-most, most + 1), indexing="ij")
+    half_width = int(grid.rings[:, 0].max()) + 1
+    a, b = np.meshgrid(np.arange(-half_width, half_width), np.arange(-half_width, half_width + 1), indexing="ij")
     return a.ravel(), b.ravel()
 
 
 def _layer_of_places(grid: Grid, first: NDArray[np.intp], second: NDArray[np.intp], centres: Array) -> Layer:
     row = rows_at(grid, centres)
-    inside = row >= 0
-    return Layer(np.stack([first, second], axis=1)[inside], row[inside], centres[inside])
+    has_cell = row >= 0
+    return Layer(np.stack([first, second], axis=1)[has_cell], row[has_cell], centres[has_cell])

@@ -1,4 +1,4 @@
-"""The survey of an arm's workspace: one pass over the samples, in chunks, whatever their number."""
+"""The survey of an arm's workspace in one pass over the samples, in chunks."""
 
 from __future__ import annotations
 
@@ -120,13 +120,13 @@ def workspace(
                 write(part.q, part.tip, part.values)
             if progress is not None:
                 progress(tally.samples)
-        # Within the block: without its volume there is no result, and then no file either.
+        # inside the block, so that an error in the volume leaves no file
         size = extent(actual_arm(arm), seed, sampling.count) if volume else None
     return tally.result(measures, size, time.perf_counter() - started)
 
 
 class Job(NamedTuple):
-    """What is asked of all samples; rows: whether they come back, for a file or a picture."""
+    """The job for all samples; rows: whether a chunk returns its samples, for a file or a picture."""
 
     sampling: Sampling
     measures: tuple[str, ...]
@@ -135,7 +135,7 @@ class Job(NamedTuple):
 
 
 class Part(NamedTuple):
-    """What some samples come to; q, tip, values: empty where no rows are asked for."""
+    """The result of a chunk of samples; q, tip, values: empty unless the job asks for rows."""
 
     samples: int
     free: int
@@ -151,7 +151,7 @@ class Part(NamedTuple):
 
 
 def survey_chunk(job: Job, number: int) -> Part:
-    """One chunk of the samples: a pure function, wherever it runs."""
+    """The result of one chunk; a pure function, whose result does not depend on the engine."""
     arm, q = job.sampling.arm, job.sampling.part(number)
     tip = job.position(q)
     values = [measure_function(arm, name)(q) for name in job.measures]
@@ -181,7 +181,7 @@ def _sampling(arm: Arm, samples: int | None, grid_points: Sequence[int] | None, 
 
 
 class _Tally:
-    """Bounds so far, and a random choice of the samples."""
+    """Bounds over all chunks so far, and a random choice of the samples."""
 
     def __init__(self, arm: Arm, count: int, measures: int, keep: int, seed: int) -> None:
         self.arm, self.samples, self.free = arm, 0, 0
@@ -204,7 +204,7 @@ class _Tally:
             self._chosen_samples.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
 
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
-        """What they come to; names: of their measures, size: the volume or area."""
+        """The survey of all samples; names: of the measures, size: the volume or area."""
         n = self.arm.n
         samples = np.concatenate(self._chosen_samples) if self._chosen_samples else np.empty((0, n + 3 + len(names)))
         return Workspace(

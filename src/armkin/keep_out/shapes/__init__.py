@@ -1,11 +1,9 @@
-"""What stands around an arm: one file a shape, each with the function that reads a keep-out's entry.
+"""Obstacles around an arm: one file for each shape, with the function that reads its entry in a file.
 
-floor.py, box.py, capsule.py; segment_distances.py: how far segments are from each other
+floor.py, box.py, capsule.py; segment_distances.py: distances between segments
 
-floor.py, box.py, capsule.py; segment_distances.py: how far segments are from each other
-
-A shape tells its signed distance to segments (negative inside), its corners for pictures, and its numbers for C.
-Another shape is one more file, a line in `_OF`, its keys in `armkin.robot_file.keep_out_keys` and its distance in C.
+A shape has a signed distance to segments (negative inside), triangles for pictures, and its numbers for C. A new shape
+needs a file, a line in `_OF`, its keys in `armkin.robot_file.keep_out_keys` and its distance in C.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Shape(Protocol):
-    """A solid that does not move; lengths in mm, in the frame of targets."""
+    """A solid that does not move; lengths in mm, in the frame of the targets."""
 
     def distance(self, a: Array, b: Array) -> Array:
         """Least signed distance over segments: a, b (3, ...) -> (...)."""
@@ -30,10 +28,10 @@ class Shape(Protocol):
         """Signed distance of points: (3, ...) -> (...)."""
 
     def triangles(self, size: float) -> Array:
-        """The surface for pictures, triangles (T, 3, 3) [mm]; size: how far one without end is drawn [mm]."""
+        """The surface for pictures, triangles (T, 3, 3) [mm]; size: extent [mm] of an unbounded shape."""
 
     def c_function(self) -> tuple[str, list[float]]:
-        """The name of the shape's distance function in C, and the numbers that it is given."""
+        """The name of the distance function in C, and its numbers."""
 
 
 _OF: dict[str, Callable[[Entry], Shape]] = {
@@ -44,5 +42,5 @@ _OF: dict[str, Callable[[Entry], Shape]] = {
 
 
 def shape_of(entry: Entry) -> Shape:
-    """The shape of an entry that is not `self`."""
+    """The shape of a keep-out entry other than `self`."""
     return _OF[entry.kind](entry)

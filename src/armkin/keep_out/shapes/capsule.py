@@ -25,20 +25,20 @@ class Capsule:
     radius: float
 
     def distance(self, a: Array, b: Array) -> Array:
-        """Distance of segments to its own, less its radius: a, b (3, ...) -> (...)."""
+        """Distance of segments to its axis, minus its radius: a, b (3, ...) -> (...)."""
         ends = (end.reshape(3, *[1] * (a.ndim - 1)) for end in (self.begin, self.end))
         return segment_distance(a, b, *ends) - self.radius
 
     def of_points(self, p: Array) -> Array:
-        """Distance of points to its segment, less its radius: (3, ...) -> (...)."""
-        begin, way = (x.reshape(3, *[1] * (p.ndim - 1)) for x in (self.begin, self.end - self.begin))
-        length = float(np.einsum("k...,k...", way, way).item())
-        share = np.einsum("k...,k...->...", p - begin, way) / length if length else 0.0
-        apart = p - begin - np.clip(share, 0.0, 1.0) * way
-        return np.asarray(np.sqrt(np.einsum("k...,k...->...", apart, apart)) - self.radius)
+        """Distance of points to its axis, minus its radius: (3, ...) -> (...)."""
+        begin, direction = (x.reshape(3, *[1] * (p.ndim - 1)) for x in (self.begin, self.end - self.begin))
+        length = float(np.einsum("k...,k...", direction, direction).item())
+        share = np.einsum("k...,k...->...", p - begin, direction) / length if length else 0.0
+        offset = p - begin - np.clip(share, 0.0, 1.0) * direction
+        return np.asarray(np.sqrt(np.einsum("k...,k...->...", offset, offset)) - self.radius)
 
     def triangles(self, size: float) -> Array:
-        """A tube with half balls."""
+        """A tube with half spheres at its ends."""
         return tube(self.begin, self.end, self.radius)
 
     def c_function(self) -> tuple[str, list[float]]:
@@ -54,13 +54,13 @@ def read_capsule(entry: Entry) -> Capsule:
 
 def tube(begin: Array, end: Array, radius: float) -> Array:
     """Triangles (T, 3, 3) of a capsule's surface."""
-    along = end - begin
-    length = float(np.linalg.norm(along))
-    z = along / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
+    direction = end - begin
+    length = float(np.linalg.norm(direction))
+    z = direction / length if length > 1e-9 else np.array([0.0, 0.0, 1.0])
     x = np.cross(z, np.eye(3)[int(np.argmin(np.abs(z)))])
     x /= np.linalg.norm(x)
-    turn = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
-    circle = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
+    angles = np.linspace(0.0, 2 * np.pi, _ROUND + 1)
+    circle = np.cos(angles)[:, None] * x + np.sin(angles)[:, None] * np.cross(z, x)
     rings = []
     for centre, heights in ((begin, np.linspace(-np.pi / 2, 0, 5)), (end, np.linspace(0, np.pi / 2, 5))):
         rings += [centre + radius * (np.cos(h) * circle + np.sin(h) * z) for h in heights]

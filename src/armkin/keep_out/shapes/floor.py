@@ -1,4 +1,4 @@
-"""A floor: all that is below a height."""
+"""A floor: all points below a height."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class Floor:
         return lower - self.height
 
     def of_points(self, p: Array) -> Array:
-        """Height above it: (3, ...) -> (...)."""
+        """Height above the floor: (3, ...) -> (...)."""
         return np.asarray(p[2] - self.height)
 
     def triangles(self, size: float) -> Array:
-        """A square of twice the size."""
+        """A square with sides of twice the size."""
         corners = np.array([[-size, -size], [size, -size], [size, size], [-size, size]])
         corners = np.column_stack([corners, np.full(4, self.height)])
         return corners[[[0, 1, 2], [0, 2, 3]]]
