@@ -167,10 +167,12 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
     u = _unit(v @ inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
-        slope = np.abs(1.0 / (v @ lost)[:, 0, 0])
+        slope = 1.0 / (v @ lost)[:, 0, 0]
         rise, fall = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
-        bend, passed = np.abs(rise - fall) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / slope
-        sharp = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * (bend + tol.CURVATURE * passed)
+        bend, passed = np.abs(rise - fall) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / np.abs(slope)
+        third = np.abs(rise + fall - 2.0 * slope) / tol.FOLD_WAY**2
+        most = bend + third * passed + 0.5 * tol.CURVATURE * passed**2
+        sharp = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * most
         end = 4.0 * np.sqrt(tol.SOLUTION / bend)
         level = (np.abs(rise + fall) < SYMMETRIC * np.abs(rise - fall)) & (slope**2 < tol.SOLUTION * bend)
     one, square = _one_direction_lost(inverse, lost, u), beside.shape[2] == 0
