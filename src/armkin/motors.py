@@ -147,15 +147,23 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     offset = values - arm.motor_bias
     q = offset @ inverse.T
     if m > arm.n:
-        apart = np.abs(q @ arm.motor_gain.T - offset)
-        # Each motor is rounded by up to half a pulse; least squares can gather all of it in one.
-        if np.any(apart > 0.5 * np.sqrt(m) + _HALF):
-            worst = motor_names(arm)[np.unravel_index(np.argmax(apart), apart.shape)[-1]]
-            raise UsageError(
-                f"the pulses contradict each other: motor {worst} is {apart.max():.1f} pulses from where "
-                "the other motors put its joints; motors of one joint must agree"
-            )
+        _check_agreement(arm, q, offset)
     return np.asarray(arm.home + q)
+
+
+def _check_agreement(arm: Arm, q: Array, offset: Array) -> None:
+    """Raise UsageError where motors are farther from joint values q (..., n) than their rounding explains.
+
+    offset: (..., motors) their pulses from home.
+    """
+    apart = np.abs(q @ arm.motor_gain.T - offset)
+    # Each motor is rounded by up to half a pulse; least squares can gather all of it in one.
+    if np.any(apart > 0.5 * np.sqrt(len(arm.motor_gain)) + _HALF):
+        worst = motor_names(arm)[np.unravel_index(np.argmax(apart), apart.shape)[-1]]
+        raise UsageError(
+            f"the pulses contradict each other: motor {worst} is {apart.max():.1f} pulses from where "
+            "the other motors put its joints; motors of one joint must agree"
+        )
 
 
 def legal_with_same_pulses(arm: Arm, q: ArrayLike) -> Array:
@@ -323,17 +331,22 @@ def _nearest_pulses(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
     actual = arm.home + (near - arm.motor_bias) @ joints_per_pulse(arm).T
     tip = position(arm, actual)
     distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)
+    distance[_is_worse_than_rounded(arm, near, actual)] = np.inf
+    # The rounded vector comes first, and argmin keeps the first of equals.
+    pick = np.argmin(distance, axis=1)
+    improved = distance[np.arange(len(q)), pick] < distance[:, 0] * (1 - 1e-12)
+    return np.asarray(near[np.arange(len(q)), np.where(improved, pick, 0)])
 
+
+def _is_worse_than_rounded(arm: Arm, near: Array, actual: Array) -> NDArray[np.bool_]:
+    """Which pulses near (N, C, motors), at joints actual (N, C, n), leave limits or travel, or make motors of a joint
+    work against each other, by more than the first ones do: (N, C)."""
     allowed = pulse_range(arm)
     overrun = np.maximum(arm.lower - actual, actual - arm.upper).max(axis=-1)
     overdrive = np.maximum(allowed[:, 0] - near, near - allowed[:, 1]).max(axis=-1)
     strain = np.abs((actual - arm.home) @ arm.motor_gain.T + arm.motor_bias - near).max(axis=-1)
     tolerance = 1e-9
-    bad = overrun > np.maximum(overrun[:, :1], 0.0) + tolerance
-    bad |= overdrive > np.maximum(overdrive[:, :1], 0.0)
-    bad |= strain > np.maximum(strain[:, :1], 0.5 - 1e-6)
-    distance[bad] = np.inf
-    # The rounded vector comes first, and argmin keeps the first of equals.
-    pick = np.argmin(distance, axis=1)
-    improved = distance[np.arange(len(q)), pick] < distance[:, 0] * (1 - 1e-12)
-    return np.asarray(near[np.arange(len(q)), np.where(improved, pick, 0)])
+    worse = overrun > np.maximum(overrun[:, :1], 0.0) + tolerance
+    worse |= overdrive > np.maximum(overdrive[:, :1], 0.0)
+    worse |= strain > np.maximum(strain[:, :1], 0.5 - 1e-6)
+    return np.asarray(worse)

@@ -60,21 +60,16 @@ def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
     """
     links = _unsigned_links(arm)
     base, theta, d = _split_first_link(arm, links[0])
-    normals = [_common_normal(link) for link in links[1:-1]]
-    thetas = [theta] + [normal.theta_after for normal in normals]
-    ds = [d] + [normal.d_after for normal in normals]
-    for i, normal in enumerate(normals):
-        thetas[i] += normal.theta
-        ds[i] += normal.d
-    twists = [(normal.alpha, normal.a) for normal in normals]
     last, tool = _split_last_link(arm, links[-1], modified)
-    thetas[-1] += last.theta
-    ds[-1] += last.d
-    before = [(0.0, 0.0), *twists] if modified else [*twists, (last.alpha, last.a)]
-    rows = [
-        {"dh": {"alpha": _degrees(alpha), "a": tidy(a, 12), "d": tidy(offset, 12), "theta": _degrees(angle)}}
-        for (alpha, a), offset, angle in zip(before, ds, thetas, strict=True)
-    ]
+    normals = [*map(_common_normal, links[1:-1]), last]
+    # of each joint: what the link before it turns about and shifts along the joint's axis
+    before = [(theta, d), *((normal.theta_after, normal.d_after) for normal in normals[:-1])]
+    twists = [(normal.alpha, normal.a) for normal in normals]
+    twists = [(0.0, 0.0), *twists[:-1]] if modified else twists
+    rows = []
+    for (alpha, a), (theta, d), normal in zip(twists, before, normals, strict=True):
+        angle, offset = _degrees(theta + normal.theta), tidy(d + normal.d, 12)
+        rows.append({"dh": {"alpha": _degrees(alpha), "a": tidy(a, 12), "d": offset, "theta": angle}})
     keys = _file_keys(arm, "modified" if modified else "standard", rows, base, tool, {})
     _check_poses(arm, keys, links)
     return keys

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -37,11 +38,20 @@ def measure_function(arm: Arm, name: str) -> Callable[[Array], Array]:
                 motors=len(arm.motor_gain),
                 most=_MAX_MOTORS,
             )
-        half = 0.5 * joints_per_pulse(arm)
-        return lambda q: _longest_sum(jacobian(arm, q)[:, :3] @ half)
+        return partial(_step_errors, arm, 0.5 * joints_per_pulse(arm))
     normal, _ = tip_freedoms(arm)
     basis = np.eye(3) if normal is None else np.linalg.svd(normal[None])[2][1:]
-    return lambda q: _singular_value_product(basis @ jacobian(arm, q)[:, :3])
+    return partial(_manipulabilities, arm, basis)
+
+
+def _step_errors(arm: Arm, half_pulses: Array, q: Array) -> Array:
+    """The worst error (N,) [mm] of the tip, each motor off by half a pulse: half_pulses (n, motors) [rad | mm]."""
+    return _longest_sum(jacobian(arm, q)[:, :3] @ half_pulses)
+
+
+def _manipulabilities(arm: Arm, basis: Array, q: Array) -> Array:
+    """Manipulability (N,) within the directions (k, 3) that the tip can move in."""
+    return _singular_value_product(basis @ jacobian(arm, q)[:, :3])
 
 
 def _singular_value_product(J: Array) -> Array:

@@ -25,13 +25,10 @@ def sampled_range(arm: Arm) -> tuple[Array, Array]:
     The ends are the limits, or -180 and 180 degrees for an unlimited revolute joint. An unlimited prismatic joint
     has no finite range and is an error.
     """
-    unlimited = [
-        name
-        for name, slides, low, high in zip(arm.joint_names, arm.prismatic, arm.lower, arm.upper, strict=True)
-        if slides and not (math.isfinite(low) and math.isfinite(high))
-    ]
-    if unlimited:
-        raise UsageError(f"prismatic joint {unlimited[0]} of {arm.name} has no limits; give it limits: [mm, mm]")
+    unlimited = np.flatnonzero(arm.prismatic & ~(np.isfinite(arm.lower) & np.isfinite(arm.upper)))
+    if len(unlimited):
+        name = arm.joint_names[unlimited[0]]
+        raise UsageError(f"prismatic joint {name} of {arm.name} has no limits; give it limits: [mm, mm]")
     low = np.where(np.isfinite(arm.lower), arm.lower, -math.pi)
     high = np.where(np.isfinite(arm.upper), arm.upper, math.pi)
     return low, high

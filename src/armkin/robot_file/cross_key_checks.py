@@ -219,11 +219,13 @@ def _check_determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[P
         if pivot is None or abs(pivot[column]) < 1e-9 * max(1.0, *(abs(x) for x in pivot)):
             yield ("motors",), f"leave joint {name} undetermined; as many independent motors as joints"
             return
-        rows = [
-            [x - row[column] / pivot[column] * p for x, p in zip(row, pivot, strict=True)]
-            for row in rows
-            if row is not pivot
-        ]
+        rows = [_eliminate(row, pivot, column) for row in rows if row is not pivot]
+
+
+def _eliminate(row: list[float], pivot: list[float], column: int) -> list[float]:
+    """The row less so much of the pivot row that its number in the column is 0."""
+    factor = row[column] / pivot[column]
+    return [x - factor * p for x, p in zip(row, pivot, strict=True)]
 
 
 def _check_gripper(robot: RobotKeys) -> Iterator[Problem]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+from operator import itemgetter
 from typing import NoReturn
 
 from pydantic import Field, PrivateAttr, ValidationError
@@ -84,7 +85,8 @@ def _place_text(path: strict_yaml.Path) -> str:
 
 
 def _refuse(name: str, problems: list[tuple[int, str]]) -> NoReturn:
-    problems.sort(key=lambda problem: problem[0])
+    """Raise the RobotFileError that lists problems, by their lines (0: of the whole file)."""
+    problems = sorted(problems, key=itemgetter(0))
     lines = [f"{name}:{line}: {text}" if line else f"{name}: {text}" for line, text in problems]
     more = f"\nand {len(lines) - _MAX_PROBLEMS} more problems" if len(lines) > _MAX_PROBLEMS else ""
     raise RobotFileError(

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -230,13 +230,22 @@ def least_time(chain: Chain, i: int, last: int) -> float:
     return float(seconds.sum())
 
 
-def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None, float | None, str]:
-    """Why a run from sample i ends: the reason, the joint and its limit (or None), the status of the next sample."""
+class EndReason(NamedTuple):
+    """Why a run of a branch ends."""
+
+    why: str
+    status: str  # of the next sample
+    joint: int | None = None  # the joint at its limit
+    limit: float | None = None  # [rad | mm]
+
+
+def end_reason(columns: Columns, chain: Chain, i: int) -> EndReason:
+    """Why a run from sample i ends: a hit, a limit, the path's end, the reach, a boundary or a singularity."""
     last = chain.carries_to(i)
     beyond = min(max(last + 1, 0), len(columns.s) - 1)
     status = Status(int(columns.status[beyond])).name.lower()
     if chain.ends_by_hit(i):
-        return "hit", None, None, status
+        return EndReason("hit", status)
     joint = chain.limiting_joint(i)
     arm = chain.arm
     if joint is not None:
@@ -246,12 +255,12 @@ def end_reason(columns: Columns, chain: Chain, i: int) -> tuple[str, int | None,
         value_beyond = q[joint] + chain.q[index, joint] - chain.q[max(index - 1, 0), joint]
         upper = abs(value_beyond - arm.upper[joint]) < abs(value_beyond - arm.lower[joint])
         limit = float(arm.upper[joint] if upper else arm.lower[joint])
-        return "limit", joint, limit, status
+        return EndReason("limit", status, joint, limit)
     if beyond == last:
-        return "end", None, None, status
+        return EndReason("end", status)
     count = columns.valid.sum(axis=1)
     # Two branches that meet at the edge of the reach end one or two samples before it.
     next_samples = (columns.s > columns.s[last]) & (columns.s < columns.s[last] + 10 * END_ACCURACY)
     if (columns.status[next_samples] == Status.UNREACHABLE).any():
-        return "reach", None, None, Status.UNREACHABLE.name.lower()
-    return ("boundary" if count[beyond] < count[last] else "singularity"), None, None, status
+        return EndReason("reach", Status.UNREACHABLE.name.lower())
+    return EndReason("boundary" if count[beyond] < count[last] else "singularity", status)

@@ -89,17 +89,17 @@ def _branch_name(columns: Columns, label: int) -> str:
 
 def _reconfiguration_at(arm: Arm, columns: Columns, chain: Chain, first: int, offset: float) -> Reconfiguration:
     """The place and the reason at which a run from sample `first` ends."""
-    reason, joint, value, status_beyond = end_reason(columns, chain, first)
+    reason = end_reason(columns, chain, first)
     last_sample = max(chain.carries_to(first), 0)
-    q = chain.q[min(last_sample + 1, chain.last) - chain.first].copy() if reason == "hit" else None
+    q = chain.q[min(last_sample + 1, chain.last) - chain.first].copy() if reason.why == "hit" else None
     hit_words = "" if q is None else hit_text(arm, q)
     return Reconfiguration(
         s=offset + float(columns.s[last_sample]),
-        why=reason,
-        joint=None if joint is None else arm.joint_names[joint],
-        index=joint,
-        value=value,
-        beyond=status_beyond,
+        why=reason.why,
+        joint=None if reason.joint is None else arm.joint_names[reason.joint],
+        index=reason.joint,
+        value=reason.limit,
+        beyond=reason.status,
         hit=hit_words,
         joints=q,
     )

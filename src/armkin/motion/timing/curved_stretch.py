@@ -4,12 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.motion.timing.cubic_knots import Knots
+
+
+class Place(NamedTuple):
+    """Places along a path and the motion there: (T,) each."""
+
+    interval: NDArray[np.intp]
+    offset: Array  # length into the interval
+    speed: Array  # ds/dt
+    accel: Array  # d2s/dt2
 
 
 @dataclass(frozen=True)
@@ -58,18 +68,18 @@ class Curve:
         """Greatest speed of every joint at the grid points: (n,)."""
         return np.asarray(np.abs(self.path.d * np.sqrt(self.x)[:, None]).max(axis=0))
 
-    def locate(self, t: Array) -> tuple[NDArray[np.intp], Array, Array, Array]:
-        """The interval, the length into it, ds/dt and d2s/dt2 at times t: (T,) each."""
+    def locate(self, t: Array) -> Place:
+        """The places along the path at times t (T,)."""
         times = np.clip(t, 0.0, self.duration)
         i = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self._u) - 1)
         tau = times - self.times[i]
         v, u = np.sqrt(self.x[i]), self._u[i]
-        return i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u
+        return Place(i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u)
 
     def lengths(self, t: Array) -> Array:
         """s at times t: (T,) -> (T,)."""
-        i, offset, _, _ = self.locate(t)
-        return np.asarray(self.path.s[i] + offset)
+        place = self.locate(t)
+        return np.asarray(self.path.s[place.interval] + place.offset)
 
     def evaluate(self, t: Array, derivative: int = 0) -> Array:
         """Joint values, or their first or second derivative, at times t [s] since its beginning: (T,) -> (T, n)."""

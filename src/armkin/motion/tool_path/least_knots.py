@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,17 +41,7 @@ class Rows:
     @staticmethod
     def from_chords(chords: Chords, used: Bool, tolerance: float) -> Rows:
         """Rows of the chords that are used: (N - 1,)."""
-        chord, fractions, weight = [np.flatnonzero(used)] * 2, [0.0, 0.5], [1.0, 0.0]
-        last = used & np.append(chords.curve[1:] != chords.curve[:-1], True)
-        chord.append(np.flatnonzero(last))
-        fractions.append(1.0)
-        weight.append(1.0)
-        numbers = np.concatenate(chord)
-        share = np.repeat(fractions, [len(numbers_of) for numbers_of in chord])
-        row_weight = np.repeat(weight, [len(numbers_of) for numbers_of in chord])
-        graded, places = _graded_places(chords, used)
-        numbers, share = np.append(numbers, graded), np.append(share, places)
-        row_weight = np.append(row_weight, np.ones(len(graded)))
+        numbers, share, row_weight = _places_on_chords(chords, used)
         u = chords.u[numbers] + share * chords.length[numbers]
         order = np.lexsort((u, chords.curve[numbers]))
         is_new = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
@@ -60,15 +51,14 @@ class Rows:
         is_point = (share == 0) | (share == 1)
         _, curve = np.unique(chords.curve[numbers], return_inverse=True)
         starts = np.append(True, curve[1:] != curve[:-1])
+        direction = np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])
         return Rows(
             u=u,
             y=np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),
             curve=curve,
             tolerance=_MISFIT_SHARE * np.where(is_point, tolerance, _CHORD_SHARE * tolerance + chords.sagitta[numbers]),
             weight=row_weight,
-            chord_direction=np.asfortranarray(
-                np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])
-            ),
+            chord_direction=np.asfortranarray(direction),
             point=np.where(is_point, numbers + (share == 1), -1),
             chord=numbers,
             chord_done=share * chords.length[numbers],
@@ -98,6 +88,20 @@ class Rows:
         return np.asarray(miss - distance[:, None] * direction)
 
 
+def _places_on_chords(chords: Chords, used: Bool) -> tuple[Int, Array, Array]:
+    """Chord number, fraction of the chord and weight of every row, in any order: (R,) each.
+
+    The begin and the middle of each chord, the middle with weight 0, the ends of curves, and `_graded_places`.
+    """
+    every, last = np.flatnonzero(used), np.flatnonzero(used & np.append(chords.curve[1:] != chords.curve[:-1], True))
+    graded, fractions = _graded_places(chords, used)
+    numbers = np.concatenate([every, every, last, graded])
+    sizes = [len(every), len(every), len(last)]
+    share = np.append(np.repeat([0.0, 0.5, 1.0], sizes), fractions)
+    weight = np.append(np.repeat([1.0, 0.0, 1.0], sizes), np.ones(len(graded)))
+    return numbers, share, weight
+
+
 def _graded_places(chords: Chords, used: Bool) -> tuple[Int, Array]:
     """Additional places on chords with a much shorter neighbour, denser towards it: chord numbers and fractions."""
     L = chords.length
@@ -124,34 +128,45 @@ def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
     row_in_curve = np.arange(len(rows.u)) - first[rows.curve]
     block = np.floor(np.minimum(row_in_curve / (2 * _MAX_POINTS), (rows.u - rows.u[first][rows.curve]) / _MAX_LENGTH))
     knot = rows.ends | np.append(False, np.diff(block) > 0)
-    # rounds since the last division, at the knot before an interval
-    weight, rounds = rows.weight.copy(), np.zeros(len(knot), int)
+    progress = _Progress(knot, weight=rows.weight.copy(), rounds=np.zeros(len(knot), int))
     active, index = rows, np.arange(len(knot))
     for _ in range(_MAX_ROUNDS - 1):
-        layout = Layout.from_points(active.u, active.curve, knot[index])
-        control = least_squares(layout, active.y, weight[index], active.ends)
+        present = progress.take(index)
+        layout = Layout.from_points(active.u, active.curve, present.knot)
+        control = least_squares(layout, active.y, present.weight, active.ends)
         miss = active.miss(layout.values(control))
         misses = np.linalg.norm(miss, axis=1) / active.tolerance
-        too_far, missed_intervals = misses > 1.0, _astray_intervals(active, layout, miss, weight[index])
+        missed_intervals = _astray_intervals(active, layout, miss, present.weight)
         missed_curves = np.zeros(active.curve[-1] + 1, bool)
-        missed_curves[active.curve[too_far]] = missed_curves[layout.curve[missed_intervals]] = True
+        missed_curves[active.curve[misses > 1.0]] = missed_curves[layout.curve[missed_intervals]] = True
         if not missed_curves.any():
             break
-        state = knot[index], weight[index], rounds[index]
-        _refine_intervals(active, layout, misses, too_far, missed_intervals, *state)
-        knot[index], weight[index], rounds[index] = state
+        _refine_intervals(active, layout, misses, missed_intervals, present)
+        for column, values in zip(progress, present, strict=True):
+            column[index] = values
         if not missed_curves.all():  # curves without a misfit are done
             index = index[missed_curves[active.curve]]
             active = rows.part(index)
-    layout = Layout.from_points(rows.u, rows.curve, knot)
-    control = least_squares(layout, rows.y, weight, rows.ends)
+    layout = Layout.from_points(rows.u, rows.curve, progress.knot)
+    control = least_squares(layout, rows.y, progress.weight, rows.ends)
     return layout, control, np.linalg.norm(rows.miss(layout.values(control)), axis=1) / rows.tolerance
 
 
-def _refine_intervals(
-    rows: Rows, layout: Layout, misses: Array, too_far: Bool, astray: Bool, knot: Bool, weight: Array, rounds: Int
-) -> None:
-    """Divide intervals that miss their rows, or raise the weights of those rows, in place."""
+class _Progress(NamedTuple):
+    """Where knots stand and what rows weigh so far: (R,) each."""
+
+    knot: Bool
+    weight: Array
+    rounds: Int  # since the last division, at the knot before an interval
+
+    def take(self, index: Int) -> _Progress:
+        """A copy of some of the rows."""
+        return _Progress(self.knot[index], self.weight[index], self.rounds[index])
+
+
+def _refine_intervals(rows: Rows, layout: Layout, misses: Array, astray: Bool, progress: _Progress) -> None:
+    """Divide intervals that miss their rows, or raise the weights of those rows: changes `progress` in place."""
+    (knot, weight, rounds), too_far = progress, misses > 1.0
     worst = np.zeros(len(layout.begin))
     np.maximum.at(worst, layout.interval[too_far], misses[too_far])
     begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))

@@ -16,6 +16,7 @@ from armkin.motors import exact_pulses, joints
 
 if TYPE_CHECKING:
     from armkin.board.firmware.segments.trajectory_to_counts import Cut
+    from armkin.board.firmware.wire.protocol import Segment
     from armkin.formula.arrays import Array
 
 _PLAN_DISTANCE = 1.5  # largest distance [steps] of each motor from a plan that the arm is on
@@ -67,17 +68,25 @@ def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
                 if np.abs(move.start - counts).max(initial=0) <= _PLAN_DISTANCE:
                     yield Place(part_number, number, 0.0, begin)
                 continue
-            steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
-            ends = move.start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
-            ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
-            times = ticks / ticks[-1] * stretch.duration
-            for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
-                travel = b - a
-                share = float(np.clip((counts - a) @ travel / max(travel @ travel, 1e-12), 0.0, 1.0))
-                if np.abs(a + share * travel - counts).max(initial=0) <= _PLAN_DISTANCE:
-                    time = _refine_time(part, number, t0 + share * (t1 - t0), counts)
-                    yield Place(part_number, number, time, begin + time)
+            for guess in _times_on_segments(move.start, segments, stretch.duration, counts):
+                time = _refine_time(part, number, guess, counts)
+                yield Place(part_number, number, time, begin + time)
         seconds_before += part.duration
+
+
+def _times_on_segments(
+    start: np.ndarray, segments: Sequence[Segment], duration: float, counts: np.ndarray
+) -> Iterator[float]:
+    """The time [s] of each segment that passes the counts, where it is nearest to them; duration: of all segments."""
+    steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
+    ends = start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
+    ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
+    times = ticks / ticks[-1] * duration
+    for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
+        travel = b - a
+        share = float(np.clip((counts - a) @ travel / max(travel @ travel, 1e-12), 0.0, 1.0))
+        if np.abs(a + share * travel - counts).max(initial=0) <= _PLAN_DISTANCE:
+            yield t0 + share * (t1 - t0)
 
 
 def _refine_time(part: Cut, number: int, guess: float, counts: np.ndarray) -> float:
