@@ -28,12 +28,8 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the options first, then the arguments."""
-        takes_value = [
-            name
-            for parameter in self.params
-            if parameter.param_type_name == "option" and not getattr(parameter, "is_flag", False)
-            for name in parameter.opts
-        ]
+        options = [p for p in self.params if p.param_type_name == "option" and not getattr(p, "is_flag", False)]
+        takes_value = [name for option in options for name in option.opts]
         if ctx.resilient_parsing and args and args[-1] in takes_value:
             args = args[:-1]  # Tab was pressed for its value
         return super().parse_args(ctx, options_first(args, takes_value))
@@ -51,11 +47,9 @@ class Command(TyperCommand):
                     formatter.write_dl(entries)
 
     def _arguments(self) -> list[tuple[str, str]]:
-        return [
-            (str(p.metavar or p.name), str(getattr(p, "help", None) or ""))
-            for p in self.params
-            if p.param_type_name == "argument"
-        ]
+        """Names and help texts of the arguments."""
+        arguments = [p for p in self.params if p.param_type_name == "argument"]
+        return [(str(p.metavar or p.name), str(getattr(p, "help", None) or "")) for p in arguments]
 
 
 class Commands(TyperGroup):

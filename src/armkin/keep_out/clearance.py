@@ -101,15 +101,10 @@ def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     arm_guard = _guard(full_arm)
     answers = []
     for clearances in arm_guard.clearances(full_q):
-        hit_pairs = [pair for pair in np.argsort(clearances, kind="stable") if clearances[pair] < 0]
-        posture_hits: list[Hit] = [
-            {
-                "body": arm_guard.pair_names(pair)[0],
-                "with": arm_guard.pair_names(pair)[1],
-                "depth_mm": float(-clearances[pair]),
-            }
-            for pair in hit_pairs
-        ]
+        posture_hits: list[Hit] = []
+        for pair in np.argsort(clearances, kind="stable")[: int((clearances < 0).sum())]:
+            body, other = arm_guard.pair_names(pair)
+            posture_hits.append({"body": body, "with": other, "depth_mm": float(-clearances[pair])})
         answers.append((float(clearances.min()) if len(clearances) else None, posture_hits))
     return answers
 
@@ -134,11 +129,7 @@ def assumed_radii(arm: Arm) -> list[tuple[str, float]]:
     if not full_arm.keep_out:
         return []
     arm_bodies = _guard(full_arm).bodies
-    return [
-        (name, float(radius))
-        for name, radius, is_assumed in zip(arm_bodies.names, arm_bodies.radius, arm_bodies.assumed, strict=True)
-        if is_assumed
-    ]
+    return [(arm_bodies.names[k], float(arm_bodies.radius[k])) for k in np.flatnonzero(arm_bodies.assumed)]
 
 
 def _guard(arm: Arm) -> Guard:

@@ -28,13 +28,8 @@ def keep_out_fields(arm: Arm) -> dict[str, Any]:
         segments: list[dict[str, Any]] = []
         for segment in np.flatnonzero(arm_bodies.owner == body):
             ends_in_frame = [(T[:3, :3].T @ (point[:, segment, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
-            segments.append(
-                {
-                    "from": ends_in_frame[0],
-                    "to": ends_in_frame[1],
-                    **({"slide": True} if arm_bodies.slide[segment] else {}),
-                }
-            )
+            fields: dict[str, Any] = {"from": ends_in_frame[0], "to": ends_in_frame[1]}
+            segments.append(fields | {"slide": True} if arm_bodies.slide[segment] else fields)
         radius, assumed = float(arm_bodies.radius[body]), bool(arm_bodies.assumed[body])
         bodies.append({"name": name, "radius_mm": radius, "assumed": assumed, "segments": segments})
     [(_, hits_at_home)] = hits(arm, home)

@@ -11,6 +11,7 @@ it must not overlap again.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -135,47 +136,20 @@ class _Round:
 
     def result(self) -> Proof:
         """The result after the last refinement."""
-        escaping = tuple(np.flatnonzero(self.start).tolist())
         count = len(self.places)
+        proof = partial(Proof, escaping=tuple(np.flatnonzero(self.start).tolist()), postures=count)
         if self.stuck < count:
             pair = int(np.argmin(self.lacking[self.stuck]))
             least_clearance = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
-            return Proof(
-                free=False,
-                place=float(self.places[self.stuck]),
-                pair=pair,
-                mm=least_clearance,
-                escaping=escaping,
-                postures=count,
-            )
+            return proof(free=False, place=float(self.places[self.stuck]), pair=pair, mm=least_clearance)
         if self.hit < count:
             pair = int(np.argmin(self.clearances[self.hit]))
-            return Proof(
-                free=False,
-                place=float(self.places[self.hit]),
-                pair=pair,
-                mm=float(self.clearances[self.hit, pair]),
-                escaping=escaping,
-                postures=count,
-            )
+            depth = float(self.clearances[self.hit, pair])
+            return proof(free=False, place=float(self.places[self.hit]), pair=pair, mm=depth)
         bound = np.where(self.start, np.inf, self.bound)
         if not len(bound) or not np.isfinite(bound).any():
             pair = int(np.argmin(self.clearances[0]))
-            return Proof(
-                free=True,
-                place=0.0,
-                pair=pair,
-                mm=float(self.clearances[:, pair].min()),
-                escaping=escaping,
-                postures=count,
-            )
+            return proof(free=True, place=0.0, pair=pair, mm=float(self.clearances[:, pair].min()))
         row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
         nearer = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
-        return Proof(
-            free=True,
-            place=float(self.places[nearer]),
-            pair=pair,
-            mm=float(bound[row, pair]),
-            escaping=escaping,
-            postures=count,
-        )
+        return proof(free=True, place=float(self.places[nearer]), pair=pair, mm=float(bound[row, pair]))

@@ -70,18 +70,14 @@ def motors_json(
     except UsageError:
         return None  # no drives; the scene says why
     start = pulses(arm, arm.home) if standing_pulses is None else np.asarray(standing_pulses)
-    outside = [
-        name
-        for name, is_outside in zip(motor_names(arm), outside_travel(arm, rounded.pulses), strict=True)
-        if is_outside
-    ]
+    names = motor_names(arm)
     return {
         "pulses": rounded.pulses.tolist(),
         "moves": (rounded.pulses - start).tolist(),
         "from": "home" if standing_pulses is None else "arm",
         "error_mm": float(rounded.error),
         "best": best,
-        "outside_travel": outside,
+        "outside_travel": [names[k] for k in np.flatnonzero(outside_travel(arm, rounded.pulses))],
     }
 
 
@@ -126,8 +122,7 @@ def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[
     values, goal = _target_of(arm, task, question, free_joints)
     request = replace(request, task=task.name)
     [answer_set] = choose_branch.solve(request, goal[None])
-    branches = answer_set.branches
-    answer: dict[str, Any] = {
+    return {
         "task": task.name,
         "labels": list(task.labels),
         "units": label_units(task.labels),
@@ -136,27 +131,34 @@ def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[
         "method": answer_set.method,
         "complete": answer_set.complete,
         "free": answer_set.free,
-        "branches": [_branch_json(arm, branch) for branch in branches],
+        "branches": [_branch_json(arm, branch) for branch in answer_set.branches],
         "names": list(answer_set.names),
         "chosen": None,
         "closest": None,
+        **_shown_fields(question, request, goal, answer_set),
     }
+
+
+def _shown_fields(
+    question: Question, request: choose_branch.Request, goal: Array, answer_set: choose_branch.Answer
+) -> dict[str, Any]:
+    """What is shown of a target: the branch of the pose, the one asked for with its `q`, or the nearest pose."""
+    branches = answer_set.branches
     if question.target is None:
-        answer["chosen"] = _branch_of_pose(branches, question.q)
-    elif answer_set.within_limits:
-        stay = [
-            index for index, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch
-        ]
-        answer["chosen"] = stay[0] if stay else 0  # the first branch, free of hits if possible
-        answer["q"] = branches[answer["chosen"]].q
-    elif question.nearest:
-        [nearest] = choose_branch.closest(request, goal[None])
-        answer["closest"] = {
-            "joints": units.joints_out(arm, nearest.q).tolist(),
-            "distance_mm": nearest.distance,
-            "angle_deg": float(units.angles_out(nearest.angle)),
-        }
-    return answer
+        return {"chosen": _branch_of_pose(branches, question.q)}
+    if answer_set.within_limits:
+        stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
+        chosen = stay[0] if stay else 0  # the first branch, free of hits if possible
+        return {"chosen": chosen, "q": branches[chosen].q}
+    if not question.nearest:
+        return {}
+    [nearest] = choose_branch.closest(request, goal[None])
+    closest = {
+        "joints": units.joints_out(request.arm, nearest.q).tolist(),
+        "distance_mm": nearest.distance,
+        "angle_deg": float(units.angles_out(nearest.angle)),
+    }
+    return {"closest": closest}
 
 
 def _branch_json(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:

@@ -194,11 +194,8 @@ class GrblMachine(StepperArm):
 
         Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
         """
-        serious = [
-            difference
-            for difference in self.wrong()
-            if difference.number in settings.HOMING_SETTINGS and difference.actual is not None
-        ]
+        of_homing = [difference for difference in self.wrong() if difference.number in settings.HOMING_SETTINGS]
+        serious = [difference for difference in of_homing if difference.actual is not None]
         if serious:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {serious[0]}; armkin setup writes it")
         self._place.forget("its homing was interrupted")

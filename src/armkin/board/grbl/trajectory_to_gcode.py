@@ -38,11 +38,8 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
             travel = float(np.linalg.norm((goal - position) / steps))
             if travel > 0.0:
                 speed = travel * stretch.law.peak if isinstance(stretch, Straight) else travel / (t - last_time)
-                words = "".join(
-                    f"{axis.letter}{value:.5f}"
-                    for axis, value, moves in zip(axes, (goal + offset) / steps, goal != position, strict=True)
-                    if moves
-                )
+                values = (goal + offset) / steps
+                words = "".join(f"{axes[k].letter}{values[k]:.5f}" for k in np.flatnonzero(goal != position).tolist())
                 yield f"{LINE_HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
             else:
                 idle += t - last_time
