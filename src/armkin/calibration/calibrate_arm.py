@@ -1,4 +1,4 @@
-"""`armkin.calibrate`: from commanded joints and measured tips to a corrected arm."""
+"""`armkin.calibrate`: computes a corrected arm from commanded joint values and measured tips."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ from armkin.robot_file.robot_file_text import format_robot_file
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-STATED = 20  # rows from which on standard deviations are stated: of 8 to 10 rows half lay within one, not 68 %
-HOPELESS = 0.25  # share of the points' spread: an error that large on unseen rows is no calibration
+STATED = 20  # rows from which on deviations are stated; with 8 to 10 rows only half of the errors lie within one
+HOPELESS = 0.25  # error on unseen rows, as a share of the points' spread, above which calibration fails
 
-# Tasks whose targets need parallel axes, or axes along the base's z: these stay as they are.
+# tasks that need parallel axes, or axes along the base's z; corrections must not change these directions
 _PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")
 _LEVEL = ("xy", "xy_theta", "xyz_yaw")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration:
-    """A corrected arm, and what is known of it.
+    """A corrected arm, with its errors and corrections.
 
     Attributes:
         arm: the corrected arm.
@@ -86,7 +86,7 @@ class Calibration:
         return float(np.sqrt(np.mean(errors**2)))
 
     def __repr__(self) -> str:
-        """The gain on rows that were not used."""
+        """The error before and after, on rows that were not used."""
         rows = f"{len(self.before)} rows"
         return f"<Calibration of {self.arm.name}: {rows}, {self.rms('before'):.3g} -> {self.rms('after'):.3g} mm>"
 
@@ -99,9 +99,9 @@ def calibrate(
     fix: Iterable[str] = (),
     tick: Callable[[int, int], object] | None = None,
 ) -> Calibration:
-    """The arm that explains measured tips, as far as the rows justify it.
+    """Correct an arm by measured tips, as far as the rows justify it.
 
-    Rows that do not fit the others are forgotten.
+    Rows that do not fit the others are ignored.
 
     Args:
         arm: the arm, as `armkin.load` gives it.
@@ -130,8 +130,8 @@ def calibrate(
     rows = _measurements(arm, q, measured)
     check_measurements(arm, rows)
     corrections = correction_model(arm)
-    hold, held = fixed_corrections(arm, fixed)
-    choice = choose_level(corrections, rows, hold, tick)
+    fixed_names, reasons = fixed_corrections(arm, fixed)
+    choice = choose_level(corrections, rows, fixed_names, tick)
     _must_explain(rows, choice)
     best_fit = choice.fit
     corrected_arm, tool = corrections.corrected_arm(best_fit.p)
@@ -145,52 +145,52 @@ def calibrate(
         noise=best_fit.scale[0],
         corrections=_list_corrections(corrections, best_fit, len(rows)),
         unseen=observability.unseen_corrections(corrections, best_fit),
-        held=held,
+        held=reasons,
     )
 
 
 def _list_corrections(model: Model, fit: Fit, rows: int) -> list[tuple[str, float, float, str]]:
-    """Name, value, standard deviation (nan: from few rows) and unit (mm, rad, 1) of each free correction."""
+    """Name, value, standard deviation (nan for few rows) and unit (mm, rad, 1) of each free correction."""
     deviations = observability.doubts(model, fit) if len(fit.free) else np.zeros(0)
     if rows < STATED:
         deviations = np.full(len(deviations), np.nan)
-    listed = []
-    for k, deviation in zip(fit.free, deviations, strict=True):
-        parameter = model.parameters[k]
-        listed.append((parameter.name, float(fit.p[k]), float(deviation), parameter.unit))
-    return listed
+    corrections = []
+    for number, deviation in zip(fit.free, deviations, strict=True):
+        parameter = model.parameters[number]
+        corrections.append((parameter.name, float(fit.p[number]), float(deviation), parameter.unit))
+    return corrections
 
 
 def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterable[str] = ()) -> Array:
-    """The next poses to measure: (count, n) [rad | mm], those that tell most about all corrections, within limits.
+    """The next poses to measure: (count, n) [rad | mm] within limits, the most informative about all corrections.
 
     q: (M, n) poses measured already; fix as in `calibrate`.
     """
     corrections = correction_model(arm)
-    hold, _ = fixed_corrections(arm, _fixed_kinds(fix))
-    before = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
+    fixed, _ = fixed_corrections(arm, _fixed_kinds(fix))
+    measured = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
     none = Measurements(np.zeros((0, arm.n)), np.zeros((0, 3)))
-    return observability.suggest_poses(corrections, count, free_at(corrections, len(LEVELS) - 1, none, hold), before)
+    return observability.suggest_poses(corrections, count, free_at(corrections, len(LEVELS) - 1, none, fixed), measured)
 
 
 def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
-    """What is not corrected, kinds and single corrections, and the kinds that the arm's task holds, in words."""
+    """Kinds and names of corrections that are not made, and a text for each that the arm's task forbids."""
     try:
         task = task_for(arm).name
     except UsageError:
         return fixed, []
-    hold, held = set(fixed), []
+    fixed_names, reasons = set(fixed), []
     if task in _PARALLEL and "twists" not in fixed:
-        hold.add("twists")
-        held.append(f"twists: task {task} needs parallel axes")
+        fixed_names.add("twists")
+        reasons.append(f"twists: task {task} needs parallel axes")
     if task in _LEVEL:
-        hold |= {"base roll", "base pitch"}
-        held.append(f"the base's roll and pitch: task {task} needs axes along z")
-    return hold, held
+        fixed_names |= {"base roll", "base pitch"}
+        reasons.append(f"the base's roll and pitch: task {task} needs axes along z")
+    return fixed_names, reasons
 
 
 def _fixed_kinds(fix: Iterable[str]) -> set[str]:
-    """The kinds that stay as the file has them; UsageError if one is unknown or none is left."""
+    """The kinds that are not corrected; UsageError if one is unknown or all are fixed."""
     fixed = {fix} if isinstance(fix, str) else set(fix)
     if unknown := sorted(fixed - set(KINDS)):
         raise UsageError(f"there is no kind {unknown[0]} of corrections; there are {', '.join(KINDS)}")
@@ -200,28 +200,28 @@ def _fixed_kinds(fix: Iterable[str]) -> set[str]:
 
 
 def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
-    """The rows, checked: UsageError for shapes that do not go together and numbers that are not finite."""
-    c = as_joints(arm, q)
+    """The rows; UsageError for shapes that do not match and numbers that are not finite."""
+    commanded = as_joints(arm, q)
     values = arrays.real_array(measured, "measured")
-    if c.ndim != 2:
-        raise UsageError(f"calibrate takes one row of joint values a pose: (M, {arm.n}); got {c.shape}")
-    shapes = ((len(c), 3), (len(c), 4, 4))
+    if commanded.ndim != 2:
+        raise UsageError(f"calibrate takes one row of joint values a pose: (M, {arm.n}); got {commanded.shape}")
+    shapes = ((len(commanded), 3), (len(commanded), 4, 4))
     if values.shape not in shapes:
         raise UsageError(f"measured has shape {values.shape}; expected {shapes[0]} or {shapes[1]}")
-    if not (np.isfinite(c).all() and np.isfinite(values).all()):
+    if not (np.isfinite(commanded).all() and np.isfinite(values).all()):
         raise UsageError("a row holds nan or infinity; every number must be finite")
     if values.ndim == 2:
-        return Measurements(c, values)
-    return Measurements(c, values[:, :3, 3], values[:, :3, :3])
+        return Measurements(commanded, values)
+    return Measurements(commanded, values[:, :3, 3], values[:, :3, :3])
 
 
 def _must_explain(rows: Measurements, choice: Choice) -> None:
     """Raise UsageError if the corrected arm misses half of the rows by too much of their spread."""
     spread = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
-    left = float(np.median(choice.errors[choice.level]))
-    enough = HOPELESS if len(rows) >= MANY_ROWS else 1.0  # few rows say little of rows they have not seen
-    if left > enough * spread:
+    error = float(np.median(choice.errors[choice.level]))
+    allowed_share = HOPELESS if len(rows) >= MANY_ROWS else 1.0  # with few rows, errors on unseen rows are unreliable
+    if error > allowed_share * spread:
         raise UsageError(
-            f"the rows do not fit this arm: half of them stay more than {left:.3g} mm off, of points {spread:.3g} mm "
+            f"the rows do not fit this arm: half of them stay more than {error:.3g} mm off, of points {spread:.3g} mm "
             "around; check the robot file, the order of the columns and the units"
         )

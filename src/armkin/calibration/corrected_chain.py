@@ -1,13 +1,14 @@
-"""An arm with small corrections: five numbers a link, a ratio a joint, six for the base and six for the tool.
+"""An arm with small corrections: five for each link, a ratio for each joint, six for base and tool each.
 
-Between the axes of joints i and i + 1 a link is A_i B_i, with A_i's x axis on their common normal (or towards the next
-joint, where the axes are within a few degrees of parallel) and A_i's origin on the next axis. A corrected arm is
+The link between the axes of joints i and i + 1 is A_i B_i. The x axis of A_i is along the common normal of the axes (or
+towards the next joint, if the axes are parallel within a few degrees), and its origin is on the next axis. A corrected
+arm is
 
     Base(6) link[0] Z1(r1 c1 + z1) A_1 Tz(d) Tx(a) Rx(alpha) Ry(beta) B_1 Z2(r2 c2 + z2) ... link[n] Tool(6)
 
-with commanded joint values c. beta is Hayati's: without it a parallel axis could not tilt about the normal's direction
-(Hayati and Mirmirani, Improving the absolute positioning accuracy of robot manipulators, 1985). The set is complete but
-not minimal; the prior of `fit_corrections` decides between corrections that do the same.
+with commanded joint values c. Without Hayati's beta, a parallel axis could not tilt about the direction of the normal
+(Hayati and Mirmirani, Improving the absolute positioning accuracy of robot manipulators, 1985). The set of corrections
+is complete but not minimal; the prior of `fit_corrections` decides between corrections with the same effect.
 """
 
 from __future__ import annotations
@@ -27,10 +28,10 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 KINDS = ("base", "tool", "zeros", "ratios", "lengths", "twists")
-NEARLY_PARALLEL = 0.05  # angle [rad] below which the common normal is too far away to hang corrections on
+NEARLY_PARALLEL = 0.05  # angle [rad] below which the common normal may be too far away for corrections
 
-# The workshop prior: what a built arm differs from its table by (standard deviations). A base is put up by hand, and a
-# measuring tip is what its owner screwed on.
+# prior: standard deviations between a built arm and its table; those of base and measuring tip are large, because
+# users place and mount them by hand
 LENGTH, SLIDE, RATIO = 0.5, 0.5, 0.003  # [mm, mm, 1]
 TWIST, ZERO = math.radians(0.3), math.radians(1.0)
 BASE, TOOL = 200.0, 20.0  # [mm]
@@ -38,7 +39,7 @@ BASE_TURN, TOOL_TURN = math.radians(30.0), math.radians(10.0)
 
 
 class Parameter(NamedTuple):
-    """One correction: its kind, its name for people, its unit, and how large workshops make it."""
+    """One correction: its kind, its name in texts, its unit, and the standard deviation of its prior."""
 
     kind: str
     name: str
@@ -47,7 +48,7 @@ class Parameter(NamedTuple):
 
 
 class _Step(NamedTuple):
-    """A factor of the chain: a constant, or a motion along or about one of the axes x, y, z."""
+    """A factor of the chain: a constant, or a motion along or about the x, y or z axis."""
 
     constant: Array | None
     axis: int = 2
@@ -66,40 +67,40 @@ class Model:
 
     @cached_property
     def prior(self) -> Array:
-        """(P,) standard deviations."""
+        """Standard deviations (P,) of the prior."""
         return np.array([parameter.prior for parameter in self.parameters])
 
     def indices(self, kind: str) -> NDArray[np.intp]:
-        """Which parameters are of a kind."""
+        """Indices of the parameters of a kind."""
         return np.flatnonzero([parameter.kind == kind for parameter in self.parameters])
 
     def poses(self, p: Array, c: Array) -> tuple[Array, Array]:
         """Poses of commanded values c (M, n) with corrections p (P,), and their derivatives.
 
-        Returns (M, 4, 4) and (M, 6, P): what a unit of each correction moves the tip by (linear rows first) [mm]
-        and turns it by [rad], in the measuring frame.
+        Returns (M, 4, 4) and (M, 6, P): the translation [mm] (first rows) and rotation [rad] of the tip in the
+        measuring frame for a unit of each correction.
         """
         M, n = c.shape
         T = np.zeros((M, 4, 4)) + np.eye(4)
         axes = np.zeros((len(self.parameters), M, 3))
         points = np.zeros((len(self.parameters), M, 3))
-        turns = np.zeros(len(self.parameters), bool)
+        rotates = np.zeros(len(self.parameters), bool)
         zeros, ratios = self.indices("zeros"), self.indices("ratios")
         for step in self.steps:
             if step.constant is not None:
                 T = T @ step.constant
                 continue
             k = zeros[step.joint] if step.joint >= 0 else step.parameter
-            axes[k], points[k], turns[k] = T[:, :3, step.axis], T[:, :3, 3], step.turns
+            axes[k], points[k], rotates[k] = T[:, :3, step.axis], T[:, :3, 3], step.turns
             value: Array | float = p[k]
             if step.joint >= 0:
                 j = step.joint
                 value = p[k] + (self.arm.ratio[j] + p[ratios[j]]) * c[:, j]
             T = _move_columns(T, step, value)
         tip = T[:, :3, 3]
-        about = turns[:, None, None]
-        moved = np.where(about, np.cross(axes, tip - points), axes)
-        J = np.concatenate([moved, axes * about], axis=2).transpose(1, 2, 0)
+        is_rotation = rotates[:, None, None]
+        translations = np.where(is_rotation, np.cross(axes, tip - points), axes)
+        J = np.concatenate([translations, axes * is_rotation], axis=2).transpose(1, 2, 0)
         for j in range(n):
             J[:, :, ratios[j]] = J[:, :, zeros[j]] * c[:, j, None]
         return T, J
@@ -131,7 +132,7 @@ class Model:
         return corrected_arm, self._product("tool", p)
 
     def _product(self, kind: str, p: Array) -> Array:
-        """The product of one kind's motions."""
+        """The product of the motions of one kind."""
         T = np.eye(4)
         for step in self.steps:
             if step.parameter >= 0 and self.parameters[step.parameter].kind == kind:
@@ -140,7 +141,7 @@ class Model:
 
 
 def correction_model(arm: Arm) -> Model:
-    """The arm with a correction at every place, all of them zero."""
+    """The model of an arm with a correction at every place."""
     parameters: list[Parameter] = []
     steps: list[_Step] = []
 
@@ -156,35 +157,35 @@ def correction_model(arm: Arm) -> Model:
 
     frame("base", BASE, BASE_TURN)
     steps.append(_Step(arm.link[0]))
-    for i, name in enumerate(arm.joint_names):
-        slides = bool(arm.prismatic[i])
-        steps.append(_Step(None, 2, not slides, joint=i))
-        parameters.append(Parameter("zeros", f"{name} zero", *(("mm", SLIDE) if slides else ("rad", ZERO))))
+    for joint, name in enumerate(arm.joint_names):
+        is_prismatic = bool(arm.prismatic[joint])
+        steps.append(_Step(None, 2, not is_prismatic, joint=joint))
+        parameters.append(Parameter("zeros", f"{name} zero", *(("mm", SLIDE) if is_prismatic else ("rad", ZERO))))
         parameters.append(Parameter("ratios", f"{name} ratio", "1", RATIO))
-        if i == arm.n - 1:
+        if joint == arm.n - 1:
             break
-        A = _link_along_normal(arm.link[i + 1], arm.reach)
+        A = _link_along_normal(arm.link[joint + 1], arm.reach)
         steps.append(_Step(A))
         move("lengths", f"{name} d", "mm", LENGTH, 2)
         move("lengths", f"{name} a", "mm", LENGTH, 0)
         move("twists", f"{name} alpha", "rad", TWIST, 0)
         move("twists", f"{name} beta", "rad", TWIST, 1)
-        steps.append(_Step(inverse(A) @ arm.link[i + 1]))
+        steps.append(_Step(inverse(A) @ arm.link[joint + 1]))
     steps.append(_Step(arm.link[-1]))
     frame("tool", TOOL, TOOL_TURN)
     return Model(arm, tuple(parameters), tuple(steps))
 
 
 def _link_along_normal(link: Array, reach: float) -> Array:
-    """A_i: x along the common normal of a link's two axes, the origin on the second."""
+    """The frame A_i: x along the common normal of a link's two axes, and its origin on the second axis."""
     z, p = link[:3, 2], link[:3, 3]
     sine = math.hypot(z[0], z[1])
     A = np.eye(4)
     if sine > NEARLY_PARALLEL:
         x = np.array([-z[1], z[0]]) / sine
-        after = float((p[:2] - (x @ p[:2]) * x) @ z[:2]) / sine**2
-        A[:3, 3] = p - after * z
-        if np.linalg.norm(A[:3, 3]) > 2 * reach:  # the normal is far off: stay with the file's origin
+        shift = float((p[:2] - (x @ p[:2]) * x) @ z[:2]) / sine**2
+        A[:3, 3] = p - shift * z
+        if np.linalg.norm(A[:3, 3]) > 2 * reach:  # with a far normal, keep the file's origin
             A[:3, 3] = p
     else:
         length = math.hypot(p[0], p[1])
@@ -195,12 +196,12 @@ def _link_along_normal(link: Array, reach: float) -> Array:
 
 
 def _axis_motion(step: _Step, value: float) -> Array:
-    """The transform (4, 4) along or about an axis."""
+    """The transform (4, 4) of a motion along or about an axis."""
     return _move_columns(np.eye(4), step, value)
 
 
 def _move_columns(T: Array, step: _Step, value: Array | float) -> Array:
-    """Transforms (..., 4, 4), and behind each a motion along or about its axis: of two columns, or of the origin."""
+    """Transforms (..., 4, 4) times a motion along or about an axis, which changes the origin or two columns."""
     T, shift = T.copy(), np.asarray(value)[..., None]
     if step.turns:
         i, j = (step.axis + 1) % 3, (step.axis + 2) % 3

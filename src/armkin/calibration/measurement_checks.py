@@ -1,4 +1,4 @@
-"""Rows that cannot be right: said before anything is fitted, as a fit would only hide it."""
+"""Checks measurements before a fit, because a fit would hide wrong rows."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from armkin.model.units import radian_or_reach
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-MIN_ROWS = 4  # rows of a measurement, at least
-STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint does not move
-ON_A_LINE = 0.01  # thickness of a cloud on a line, at most, as a share of the rows' length
-FITS = 0.1  # miss, as a share of the rows' spread, that needs no explanation
-EXPLAINS = 0.35  # share of the miss as given that another reading must leave to be the explanation
+MIN_ROWS = 4  # fewest rows of a measurement
+STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint counts as not moving
+ON_A_LINE = 0.01  # thickness of a cloud, as a share of its length, below which its points are on a line
+FITS = 0.1  # error, as a share of the points' spread, below which no other reading is tried
+EXPLAINS = 0.35  # share of the error that another reading must not exceed to be the explanation
 
 
 def check_measurements(arm: Arm, data_rows: Measurements) -> None:
-    """Raise UsageError, naming what is wrong, if the rows cannot calibrate this arm."""
+    """Raise UsageError with the reason if the rows cannot calibrate this arm."""
     if len(data_rows) < MIN_ROWS:
         rows = "1 row is" if len(data_rows) == 1 else f"{len(data_rows)} rows are"
         raise UsageError(f"{rows} too few; measure at least {MIN_ROWS}, better 20 to 60")
@@ -37,13 +37,13 @@ def check_measurements(arm: Arm, data_rows: Measurements) -> None:
 
 def _check_motion(arm: Arm, rows: Measurements) -> None:
     """Raise UsageError if a joint never moves, or all of them in step."""
-    least = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
-    still = np.flatnonzero(np.ptp(rows.c, axis=0) < least)
-    if len(still):
-        names = ", ".join(arm.joint_names[j] for j in still)
+    thresholds = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
+    motionless = np.flatnonzero(np.ptp(rows.c, axis=0) < thresholds)
+    if len(motionless):
+        names = ", ".join(arm.joint_names[j] for j in motionless)
         raise UsageError(
-            f"{names} never move{'s' if len(still) == 1 else ''} in the rows: corrections of "
-            f"{'it' if len(still) == 1 else 'them'} cannot be determined; measure poses that move every joint"
+            f"{names} never move{'s' if len(motionless) == 1 else ''} in the rows: corrections of "
+            f"{'it' if len(motionless) == 1 else 'them'} cannot be determined; measure poses that move every joint"
         )
     unit = radian_or_reach(arm)
     sizes = np.linalg.svd((rows.c - rows.c.mean(axis=0)) / unit, compute_uv=False)
@@ -57,9 +57,9 @@ def _check_motion(arm: Arm, rows: Measurements) -> None:
 def _check_spread(rows: Measurements) -> None:
     """Raise UsageError if the measured points lie on a line."""
     centred = rows.position - np.median(rows.position, axis=0)
-    # The rows nearest the middle of the cloud: a wrong row alone would make a line look thick.
-    near = np.argsort(np.linalg.norm(centred, axis=1))[: max(MIN_ROWS, math.ceil(0.8 * len(centred)))]
-    sizes = np.linalg.svd(centred[near] - centred[near].mean(axis=0), compute_uv=False)
+    # use the rows nearest to the middle of the cloud, as a single wrong row would make a line look thick
+    inner_rows = np.argsort(np.linalg.norm(centred, axis=1))[: max(MIN_ROWS, math.ceil(0.8 * len(centred)))]
+    sizes = np.linalg.svd(centred[inner_rows] - centred[inner_rows].mean(axis=0), compute_uv=False)
     if sizes[1] < ON_A_LINE * sizes[0] or sizes[0] == 0:
         raise UsageError(
             "the measured points lie on a line: a turn about it leaves them where they are; measure points all around"
@@ -67,7 +67,7 @@ def _check_spread(rows: Measurements) -> None:
 
 
 class _Reading(NamedTuple):
-    """Another way to read the rows."""
+    """Another interpretation of the rows."""
 
     explanation: str
     c: Array
@@ -78,25 +78,25 @@ def _check_readings(arm: Arm, rows: Measurements) -> None:
     """Raise UsageError if the rows fit far better in other units or with columns or signs changed."""
     expected = position(arm, rows.c)
     size = _cloud_size(rows.position)
-    miss, plain = _aligned_miss(expected, rows.position), _median_miss(expected, rows.position)
-    says = ""
-    if plain > FITS * size:
-        says = _axes_in_place(expected, rows.position, 0.2 * plain, FITS * size)
-    if not says and miss > FITS * size:
-        least = EXPLAINS * miss
+    miss, median_miss = _aligned_miss(expected, rows.position), _median_miss(expected, rows.position)
+    hint = ""
+    if median_miss > FITS * size:
+        hint = _axes_in_place(expected, rows.position, 0.2 * median_miss, FITS * size)
+    if not hint and miss > FITS * size:
+        least_miss = EXPLAINS * miss
         for reading in _readings(arm, rows):
-            moved = position(arm, reading.c)
-            reading_miss = _aligned_miss(moved, reading.position) * size / max(_cloud_size(reading.position), 1e-12)
-            if reading_miss < least:
-                least, says = 0.999 * reading_miss, reading.explanation
-    if says:
-        raise UsageError(f"{says}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
+            tips = position(arm, reading.c)
+            reading_miss = _aligned_miss(tips, reading.position) * size / max(_cloud_size(reading.position), 1e-12)
+            if reading_miss < least_miss:
+                least_miss, hint = 0.999 * reading_miss, reading.explanation
+    if hint:
+        raise UsageError(f"{hint}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
 
 
 def _axes_in_place(expected: Array, measured: Array, most: float, largest: float) -> str:
-    """Why points (M, 3) fit without any motion once axes change places or one of them its sign; "" if they do not.
+    """The explanation of points (M, 3) that fit after a permutation or a change of sign of axes; "" if none fits.
 
-    Measuring frames may stand anywhere, so `_readings` allows any rigid motion; these need none, and are tried first.
+    These readings are tried first and without rigid motions, while `_readings` allows any measuring frame.
     """
     candidates = []
     for order in itertools.permutations(range(3)):
@@ -114,7 +114,7 @@ _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "
 
 
 def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
-    """What the rows would be in other units, with columns swapped, or with one joint's sign changed."""
+    """The rows in other units, with columns swapped, or with the sign of one joint changed."""
     c, x = rows.c, rows.position
     degree = units.joint_scale(arm)
     readings = [
@@ -134,8 +134,8 @@ def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
         sign[j] = -1.0
         readings.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
     for axes in ((0, 2, 1), (2, 1, 0), (1, 0, 2)):
-        says = f"columns {_axis_names(axes)} of the measured points look like x y z"
-        readings.append(_Reading(says, c, x[:, axes]))
+        explanation = f"columns {_axis_names(axes)} of the measured points look like x y z"
+        readings.append(_Reading(explanation, c, x[:, axes]))
     return readings
 
 
@@ -149,12 +149,12 @@ def _cloud_size(x: Array) -> float:
 
 
 def _median_miss(expected: Array, measured: Array) -> float:
-    """The median miss, frames as they are."""
+    """The median error without any motion."""
     return float(np.median(np.linalg.norm(measured - expected, axis=1)))
 
 
 def _aligned_miss(expected: Array, measured: Array) -> float:
-    """The median miss after the best rigid motion of the expected points (Kabsch, 1976), robustly."""
+    """The median error after the best rigid motion of the expected points (Kabsch, 1976), with robust weights."""
     weight = np.ones(len(expected))
     distances = np.zeros(len(expected))
     for _ in range(6):

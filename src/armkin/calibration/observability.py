@@ -1,4 +1,4 @@
-"""What the rows show: which corrections they determine, which only as sums, and which poses would tell more.
+"""Observability: which corrections the rows determine, singly or only as sums, and which poses add most.
 
 All from the fit's normal matrix in units of the prior: its inverse says how much of each correction's prior doubt is
 left (Hollerbach and Wampler, The calibration index and taxonomy for robot kinematic calibration methods, 1996).
@@ -22,39 +22,39 @@ if TYPE_CHECKING:
 
     from armkin.model.arm import Arm
 
-UNSEEN = 0.7  # share of the prior's doubt: a correction of which more is left is not shown by the rows
-SUM_CORRELATION = 0.9  # correlation of two corrections from which on only their sum is seen
-CANDIDATES = 400  # postures among which the next ones to measure are chosen
-UNLIMITED = np.pi, 200.0  # way [rad, mm] that an unlimited joint is moved for a suggestion
+UNSEEN = 0.7  # remaining share of the prior's deviation above which the rows do not determine a correction
+SUM_CORRELATION = 0.9  # correlation of two corrections above which only their sum is determined
+CANDIDATES = 400  # random postures from which the next ones to measure are chosen
+UNLIMITED = np.pi, 200.0  # range [rad, mm] to each side of an unlimited joint for suggestions
 
 
 def doubts(model: Model, fit: Fit) -> Array:
-    """How large each free correction may still be: (F,) standard deviations [mm, rad, 1]."""
+    """The remaining standard deviation of each free correction: (F,) [mm, rad, 1]."""
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(fit.normal))) * model.prior[fit.free])
 
 
 def unseen_corrections(model: Model, fit: Fit) -> list[str]:
-    """Corrections that the rows do not show, in words; those of which they show the sum stand together."""
+    """Texts about corrections that the rows do not determine; those with a determined sum share a text."""
     if not len(fit.free):
         return []
-    spread = np.linalg.inv(fit.normal)
-    left = np.sqrt(np.diag(spread))
-    correlation = spread / np.outer(left, left)
-    names = [model.parameters[k].name for k in fit.free]
-    weak = np.flatnonzero(left > UNSEEN)
-    lines: list[str] = []
+    covariance = np.linalg.inv(fit.normal)
+    deviations = np.sqrt(np.diag(covariance))
+    correlation = covariance / np.outer(deviations, deviations)
+    names = [model.parameters[number].name for number in fit.free]
+    unseen = np.flatnonzero(deviations > UNSEEN)
+    texts: list[str] = []
     grouped: set[int] = set()
-    for k in weak:
-        if k in grouped:
+    for number in unseen:
+        if number in grouped:
             continue
-        group = [k] + [j for j in np.flatnonzero(np.abs(correlation[k]) > SUM_CORRELATION) if j != k]
+        group = [number] + [j for j in np.flatnonzero(np.abs(correlation[number]) > SUM_CORRELATION) if j != number]
         grouped.update(int(j) for j in group)
-        lines.append(names[k] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
-    return lines
+        texts.append(names[number] if len(group) == 1 else " + ".join(names[j] for j in group) + " (only their sum)")
+    return texts
 
 
 def left_open(model: Model, fit: Fit) -> float:
-    """The tip's standard deviation after a fit, by the fit's covariance [mm]: root mean square over 100 poses.
+    """Standard deviation of the tip [mm] by the covariance of a fit: root mean square over 100 poses.
 
     The poses are random, within limits.
     """
@@ -63,10 +63,10 @@ def left_open(model: Model, fit: Fit) -> float:
 
 
 def suggest_poses(model: Model, count: int, free: NDArray[np.intp], measured: Array | None = None) -> Array:
-    """Joint values (count, n) whose measurement would tell most, one after the other, within limits.
+    """The most informative joint values (count, n) to measure next, within limits.
 
-    free: the corrections to see; measured: (M, n) poses measured already. Each next pose is that of 400 random ones
-    with the largest gain of information, log det(I + J N^-1 J^T) (D-optimality, greedily).
+    free: the corrections to determine; measured: (M, n) poses measured already. Each next pose is the one of 400 random
+    poses with the largest gain of information, log det(I + J N^-1 J^T) (greedy D-optimality).
     """
     if count < 1 or count > 1000:
         raise UsageError(f"{count} poses cannot be suggested; ask for 1 to 1000")
@@ -83,14 +83,14 @@ def suggest_poses(model: Model, count: int, free: NDArray[np.intp], measured: Ar
     for _ in range(count):
         gain = np.linalg.slogdet(np.eye(3) + J @ np.linalg.solve(N, np.swapaxes(J, 1, 2)))[1]
         gain[chosen] = -np.inf if len(chosen) < CANDIDATES else gain[chosen]
-        k = int(np.argmax(gain))
-        chosen.append(k)
-        N = N + J[k].T @ J[k]
+        best = int(np.argmax(gain))
+        chosen.append(best)
+        N = N + J[best].T @ J[best]
     return np.asarray(candidates[chosen])
 
 
 def _joint_range(arm: Arm) -> tuple[Array, Array]:
-    """Limits, lower and upper (n,) [rad | mm]; where a joint has none, half a turn or 200 mm to that side."""
+    """Lower and upper limits (n,) [rad | mm]; half a turn or 200 mm to a side without a limit."""
     span = np.where(arm.prismatic, UNLIMITED[1], UNLIMITED[0])
     low = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - span, -span))
     return low, np.where(np.isfinite(arm.upper), arm.upper, np.where(np.isfinite(arm.lower), arm.lower + span, span))
@@ -102,6 +102,6 @@ def _random_poses(arm: Arm, count: int) -> Array:
 
 
 def _whitened_jacobian(model: Model, c: Array, free: NDArray[np.intp]) -> Array:
-    """What the corrections do to the tip, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
+    """Displacement of the tip by the corrections, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
     J = model.poses(np.zeros(len(model.parameters)), c)[1][:, :3, free]
     return np.asarray(J * model.prior[free] / max(0.1, MIN_SCALES[0]))

@@ -1,7 +1,7 @@
 """Robust damped Gauss-Newton with a prior.
 
-Minimised is sum rho(|r_k| / s) + sum (p_i / prior_i)^2, with the loss rho and the scale s of `dropped_rows`: rows
-that are far out are forgotten. What the rows do not show stays where the prior has it: at the robot file.
+The fit minimises sum rho(|r_k| / s) + sum (p_i / prior_i)^2, with the loss rho and the scale s of `dropped_rows`, which
+ignore outliers. Corrections that the rows do not determine stay at the prior, that is at the robot file.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from armkin.calibration.corrected_chain import Model
 from armkin.calibration.dropped_rows import loss, scales, weights
 from armkin.formula.arrays import Array
 
-STEPS = 40  # steps, at most, of a fit
+STEPS = 40  # most steps of a fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class Fit:
 
 
 class Residuals(NamedTuple):
-    """What the model misses, and how that depends on the corrections."""
+    """Differences between measured and modelled tips, and their dependence on the corrections."""
 
     position: Array  # (M, 3) [mm]
     turn: Array | None  # (M, 3) [rad]; None where no rotations were measured
@@ -56,14 +56,14 @@ class Residuals(NamedTuple):
 
 
 def residuals(model: Model, p: Array, rows: Measurements) -> Residuals:
-    """What the model with corrections p (P,) misses of the rows."""
+    """The residuals of the model with corrections p (P,)."""
     T, J = model.poses(p, rows.c)
-    missed_position = rows.position - T[:, :3, 3]
+    position_residuals = rows.position - T[:, :3, 3]
     if rows.rotation is None:
-        return Residuals(missed_position, None, J)
-    # Half the sum of the columns' cross products is the rotation vector to third order.
-    turn = 0.5 * np.cross(T[:, :3, :3], rows.rotation, axis=1).sum(axis=2)
-    return Residuals(missed_position, turn, J)
+        return Residuals(position_residuals, None, J)
+    # half the sum of the columns' cross products is the rotation vector, with an error of third order
+    rotation_residuals = 0.5 * np.cross(T[:, :3, :3], rows.rotation, axis=1).sum(axis=2)
+    return Residuals(position_residuals, rotation_residuals, J)
 
 
 def fit_corrections(
@@ -73,53 +73,53 @@ def fit_corrections(
     start: Array | None = None,
     steps: int = STEPS,
 ) -> Fit:
-    """The corrections of the free parameters that fit best; the others stay at `start` (0)."""
+    """The best fit of the free parameters; the others stay at `start` (0)."""
     p = np.zeros(len(model.parameters)) if start is None else start.copy()
     prior = model.prior[free]
     damping = 1e-3
-    missed = residuals(model, p, rows)
-    fitted_numbers = 0.0  # numbers that the fit itself has used up
+    current = residuals(model, p, rows)
+    fitted_numbers = 0.0  # effective number of fitted parameters
     for step in range(steps):
-        scale = scales(missed.position, missed.turn, fitted_numbers)
-        H, g = _normal_equations(missed, scale, free, prior)
+        scale = scales(current.position, current.turn, fitted_numbers)
+        H, g = _normal_equations(current, scale, free, prior)
         z = p[free] / prior
-        cost = _cost(missed, scale, z)
+        cost = _cost(current, scale, z)
         with_prior = H + np.eye(len(free))
         fitted_numbers = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
         for _ in range(8):
             move = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), g - z)
-            trial = p.copy()
-            trial[free] += move * prior
-            trial_missed = residuals(model, trial, rows)
-            if _cost(trial_missed, scale, z + move) <= cost:
+            trial_p = p.copy()
+            trial_p[free] += move * prior
+            trial_residuals = residuals(model, trial_p, rows)
+            if _cost(trial_residuals, scale, z + move) <= cost:
                 break
             damping = max(damping, 1e-6) * 10
         else:
             break  # no step lowers the cost
-        p, missed = trial, trial_missed
+        p, current = trial_p, trial_residuals
         damping *= 0.1
         if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
             break
-    scale = scales(missed.position, missed.turn, fitted_numbers)
-    H, _ = _normal_equations(missed, scale, free, prior)
-    row_weights = np.minimum(weights(missed.position, scale[0]), weights(missed.turn, scale[1]))
+    scale = scales(current.position, current.turn, fitted_numbers)
+    H, _ = _normal_equations(current, scale, free, prior)
+    row_weights = np.minimum(weights(current.position, scale[0]), weights(current.turn, scale[1]))
     return Fit(p, scale, row_weights, H + np.eye(len(free)), free)
 
 
-def _cost(missed: Residuals, scale: tuple[float, float], z: Array) -> float:
-    """What is minimised, of corrections z in units of the prior."""
-    parts = ((missed.position, scale[0]), (missed.turn, scale[1]))
+def _cost(current: Residuals, scale: tuple[float, float], z: Array) -> float:
+    """The minimised sum, for corrections z in units of the prior."""
+    parts = ((current.position, scale[0]), (current.turn, scale[1]))
     return float(z @ z) + sum(loss(r, s) for r, s in parts if r is not None)
 
 
 def _normal_equations(
-    missed: Residuals, scale: tuple[float, float], free: NDArray[np.intp], prior: Array
+    current: Residuals, scale: tuple[float, float], free: NDArray[np.intp], prior: Array
 ) -> tuple[Array, Array]:
     """J^T W J and J^T W r of the free parameters, in units of the prior and the scales, without the prior."""
-    J = missed.jacobian[:, :, free] * prior
-    A, b = _weighted_equations(J[:, :3], missed.position, scale[0])
-    if missed.turn is not None:
-        A_turn, b_turn = _weighted_equations(J[:, 3:], missed.turn, scale[1])
+    J = current.jacobian[:, :, free] * prior
+    A, b = _weighted_equations(J[:, :3], current.position, scale[0])
+    if current.turn is not None:
+        A_turn, b_turn = _weighted_equations(J[:, 3:], current.turn, scale[1])
         A, b = np.concatenate([A, A_turn]), np.concatenate([b, b_turn])
     return A.T @ A, A.T @ b
 
