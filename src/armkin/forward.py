@@ -5,7 +5,7 @@ Every arm, whatever its convention, is one chain
     T(q) = link[0] Z1(r1 q1) link[1] Z2(r2 q2) ... Zn(rn qn) link[n],   Z = Rz (revolute) or Tz (prismatic)
 
 (Craig, Introduction to Robotics, eq. 3.6 with the constant factors of neighbouring rows
-merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws). The ratios r are 1 but for calibrated arms.
+merged; Lynch & Park, Modern Robotics, eq. 4.14 for screws). The ratios r differ from 1 only for calibrated arms.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from armkin.formula.trace import SMALL_BATCH, LazyCode, StraightLineCode
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-Motion = Entry | tuple[Entry, Entry]  # a joint's value; of one that turns also cosine and sine of its actual angle
+Motion = Entry | tuple[Entry, Entry]  # a joint value, or the cosine and sine of the actual angle of a revolute joint
 FEW_POSES = 16  # poses up to which plain Python is faster than arrays
 
 
@@ -124,8 +124,8 @@ def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
     values = as_joints(arm, q)
     entries = _run_batched(arm, values, (16 + 6 * arm.n,), _pose_and_jacobian)
-    lead = values.shape[:-1]
-    return entries[..., :16].reshape(*lead, 4, 4), entries[..., 16:].reshape(*lead, 6, arm.n)
+    batch_shape = values.shape[:-1]
+    return entries[..., :16].reshape(*batch_shape, 4, 4), entries[..., 16:].reshape(*batch_shape, 6, arm.n)
 
 
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
@@ -177,13 +177,13 @@ def _singular_values(arm: Arm, q: ArrayLike, rows: slice | list[int] | None, sca
     J = jacobian(arm, q)
     J[..., :3, :] /= scale
     J = J[..., rows, :]
-    finite = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # not so for the nan rows of `Solutions.q`
+    finite = np.asarray(np.isfinite(J).all(axis=(-2, -1), keepdims=True))  # False for the nan rows of `Solutions.q`
     values = np.linalg.svd(np.where(finite, J, 0.0), compute_uv=False)
     return np.where(finite[..., 0], values, np.nan)
 
 
 def move(arm: Arm, P: Pose, joint: int, value: Motion) -> Pose:
-    """The pose after a joint's motion: ``P Z(r q)``, r the joint's ratio."""
+    """The pose after the motion of a joint: ``P Z(r q)`` with the joint's ratio r."""
     if arm.prismatic[joint]:
         return pose.slide(P, _actual_slide(arm, joint, value))
     return pose.rotate(P, *_actual_cos_sin(arm, joint, value))
@@ -225,8 +225,8 @@ def as_joints(arm: Arm, q: ArrayLike) -> Joints:
 def tip_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose, row by row: 16 entries."""
     P = pose.constant(arm.link[0])
-    for i in range(arm.n):
-        P = pose.compose(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+    for joint in range(arm.n):
+        P = pose.compose(move(arm, P, joint, q[joint]), pose.constant(arm.link[joint + 1]))
     return _matrix_entries(P)
 
 
@@ -234,10 +234,10 @@ def _frames_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """All frames, row by row: 16 (n + 2) entries."""
     entries = _matrix_entries(pose.constant(arm.base))
     P = pose.constant(arm.link[0])
-    for i in range(arm.n):
-        P = move(arm, P, i, q[i])
-        entries += _matrix_entries(pose.compose(P, pose.constant(arm.frame[i])))
-        P = pose.compose(P, pose.constant(arm.link[i + 1]))
+    for joint in range(arm.n):
+        P = move(arm, P, joint, q[joint])
+        entries += _matrix_entries(pose.compose(P, pose.constant(arm.frame[joint])))
+        P = pose.compose(P, pose.constant(arm.link[joint + 1]))
     return entries + _matrix_entries(P)
 
 
@@ -250,14 +250,14 @@ def _pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose and the Jacobian, row by row: 16 + 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []
-    for i in range(arm.n):
+    for joint in range(arm.n):
         axes.append((P[6:9], P[9:12]))
-        P = pose.compose(move(arm, P, i, q[i]), pose.constant(arm.link[i + 1]))
+        P = pose.compose(move(arm, P, joint, q[joint]), pose.constant(arm.link[joint + 1]))
     columns = []
-    for i, (z, origin) in enumerate(axes):
+    for joint, (z, origin) in enumerate(axes):
         lever = arrays.combine(1.0, P[9:12], -1.0, origin)
-        column = [*z, 0.0, 0.0, 0.0] if arm.prismatic[i] else [*arrays.cross(z, lever), *z]
-        ratio = float(arm.ratio[i])
+        column = [*z, 0.0, 0.0, 0.0] if arm.prismatic[joint] else [*arrays.cross(z, lever), *z]
+        ratio = float(arm.ratio[joint])
         columns.append(column if ratio == 1.0 else [arrays.mul(ratio, entry) for entry in column])
     return [*_matrix_entries(P), *(column[row] for row in range(6) for column in columns)]
 
@@ -268,31 +268,31 @@ def _matrix_entries(P: Pose) -> list[Entry]:
 
 
 def point_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
-    """The tool's position, from the tool back to the base: a point is cheaper to carry than a pose."""
+    """The tool's position, computed from the tool to the base, as transforming a point costs less than a pose."""
     p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
-    for i in reversed(range(arm.n)):
-        if arm.prismatic[i]:
-            p = [p[0], p[1], arrays.add(p[2], _actual_slide(arm, i, q[i]))]
+    for joint in reversed(range(arm.n)):
+        if arm.prismatic[joint]:
+            p = [p[0], p[1], arrays.add(p[2], _actual_slide(arm, joint, q[joint]))]
         else:
-            c, s = _actual_cos_sin(arm, i, q[i])
+            c, s = _actual_cos_sin(arm, joint, q[joint])
             x, y, z = p
             p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
-        p = pose.apply(pose.constant(arm.link[i]), p)
+        p = pose.apply(pose.constant(arm.link[joint]), p)
     return p
 
 
 def _single_pose(arm: Arm, q: Array) -> Array:
-    """The tool's pose for one set of joint values, by matrix products: shorter than any batch of one."""
+    """The tool's pose for one posture by matrix products, which is faster than a batch of one."""
     T = arm.link[0]
-    for i in range(arm.n):
-        Z, value = np.eye(4), arm.ratio[i] * q[i]
-        if arm.prismatic[i]:
+    for joint in range(arm.n):
+        Z, value = np.eye(4), arm.ratio[joint] * q[joint]
+        if arm.prismatic[joint]:
             Z[2, 3] = value
         else:
             c, s = (math.cos(value), math.sin(value)) if math.isfinite(value) else (math.nan, math.nan)
             Z[0, 0] = Z[1, 1] = c
             Z[0, 1], Z[1, 0] = -s, s
-        T = T @ Z @ arm.link[i + 1]
+        T = T @ Z @ arm.link[joint + 1]
     return np.asarray(T)
 
 
@@ -307,19 +307,19 @@ def _recorded_code(arm: Arm, formula: Formula) -> LazyCode:
 
 @lru_cache(maxsize=256)
 def _recorded_of_turns(arm: Arm, formula: Formula) -> LazyCode:
-    """A formula of what `_slides_and_turns` returns as straight-line code."""
+    """A formula of the result of `_slides_and_turns` as straight-line code."""
     return LazyCode(lambda inputs: formula(arm, _joint_motions(arm, inputs)), 2 * arm.n - int(arm.prismatic.sum()))
 
 
 @lru_cache(maxsize=256)
 def _turn_places(arm: Arm) -> tuple[NDArray[np.intp], NDArray[np.intp], Array]:
-    """Rows of `_slides_and_turns` where slides and where cosines stand, and the ratios of what turns (m, 1)."""
+    """Rows of `_slides_and_turns` with slides and with cosines, and the ratios of the revolute joints (m, 1)."""
     first = np.cumsum([0, *np.where(arm.prismatic, 1, 2)])[:-1]
     return first[arm.prismatic], first[~arm.prismatic], arm.ratio[~arm.prismatic, None]
 
 
 def _slides_and_turns(arm: Arm, q: Array) -> Array:
-    """Slides, and actual cosines and sines of what turns, joint by joint: q (N, n) [rad | mm] -> (2 n - slides, N)."""
+    """Slides, or actual cosines and sines, joint by joint: q (N, n) [rad | mm] -> (2 n - slides, N)."""
     slides, turning, ratio = _turn_places(arm)
     values = np.ascontiguousarray(q.T)
     rows = np.empty((len(slides) + 2 * len(turning), len(q)))
@@ -332,7 +332,7 @@ def _slides_and_turns(arm: Arm, q: Array) -> Array:
 
 
 def _joint_motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
-    """What `_slides_and_turns` returns, one entry a joint: a slide, or a cosine and a sine."""
+    """The result of `_slides_and_turns` for each joint: a slide, or a cosine and a sine."""
     remaining = iter(turns)
     return [next(remaining) if slides else (next(remaining), next(remaining)) for slides in arm.prismatic.tolist()]
 
@@ -349,7 +349,7 @@ def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formu
 
 
 def _fill_by_chunks(rows: Array, q: Array, code: StraightLineCode) -> None:
-    """Write the entries of many poses q (N, n) into rows (N, entries), in chunks that stay in the cache."""
+    """Write the entries of many poses q (N, n) into rows (N, entries), in chunks that fit the cache."""
     workspace = code.workspace(min(len(q), arrays.CHUNK))
     for start in range(0, len(q), arrays.CHUNK):
         chunk = slice(start, start + arrays.CHUNK)

@@ -1,6 +1,6 @@
-"""Names for the shapes of arrays: what a signature returns; n is the arm's number of joints, ... the batch.
+"""Names of array shapes for signatures; n is the arm's number of joints, ... the batch.
 
-They are `Array` for the type checker and at run time; the name tells the reader the shape.
+All names are `Array` for the type checker and at run time; they only inform the reader.
 """
 
 from __future__ import annotations
@@ -12,4 +12,4 @@ Points = Array  # (..., 3) positions of the tool [mm]
 Poses = Array  # (..., 4, 4) homogeneous transforms [mm]
 Frames = Array  # (..., n + 2, 4, 4) base, joints' frames and tool [mm]
 Jacobians = Array  # (..., 6, n) linear rows first [mm/rad, 1; prismatic: 1, 0]
-Figures = Array  # (...) one number a posture
+Figures = Array  # (...) a number for each posture

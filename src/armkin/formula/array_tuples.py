@@ -1,4 +1,4 @@
-"""Named tuples of arrays with a row a target or candidate: some of all rows, several parts one below the other."""
+"""Named tuples of arrays with a row for each target or candidate: selecting, stacking and replacing rows."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Columns = TypeVar("Columns")  # a named tuple of arrays
 def rows_of(columns: Columns, rows: NDArray[Any] | slice) -> Columns:
     """Some rows: by indices, flags or as a slice."""
     table: Any = columns
-    taken: Columns = table._make(column[rows] for column in table)
-    return taken
+    selected: Columns = table._make(column[rows] for column in table)
+    return selected
 
 
 def stack_rows(parts: Sequence[Columns]) -> Columns:
-    """The rows of all parts, as wide as the widest needs; a column that is None in the first one is in all."""
+    """The rows of all parts, padded to the widest; a column that is None in the first part is None in all."""
     if len(parts) == 1:
         return parts[0]
     first: Any = parts[0]
@@ -28,7 +28,7 @@ def stack_rows(parts: Sequence[Columns]) -> Columns:
 
 
 def replace_rows(columns: Columns, index: NDArray[Any], rows: Columns) -> Columns:
-    """The columns with other rows at `index`, as wide as both need; columns that are wide enough change in place."""
+    """The columns with new rows at `index`, padded to the wider ones; columns that are wide enough change in place."""
     table: Any = columns
     pairs = zip(table, rows, strict=True)  # type: ignore[call-overload]
     changed: Columns = table._make(_replace_values(column, index, values) for column, values in pairs)
@@ -42,7 +42,7 @@ def _replace_values(column: NDArray[Any], index: NDArray[Any], rows: NDArray[Any
 
 
 def _concatenate(parts: Sequence[Any]) -> Any:
-    """Arrays or named tuples one below the other."""
+    """Stack arrays or named tuples."""
     if parts[0] is None:
         return None
     if isinstance(parts[0], tuple):
@@ -52,7 +52,7 @@ def _concatenate(parts: Sequence[Any]) -> Any:
 
 
 def widen_columns(array: NDArray[Any], width: int) -> NDArray[Any]:
-    """An array (N, B, ...) with at least so many columns: nan, False or -1 behind."""
+    """An array (N, B, ...) padded to a number of columns with nan, False or -1."""
     if array.ndim < 2 or array.shape[1] >= width:
         return array
     missing = {"f": np.nan, "b": False}.get(array.dtype.kind, -1)

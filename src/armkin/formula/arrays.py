@@ -1,7 +1,7 @@
-"""Entries of formulas: arrays over the batch, or plain numbers that are known to be constant.
+"""Entries of formulas: arrays over the batch, or plain numbers for constants.
 
-What is known to be constant (the zeros and ones that most DH tables are full of) stays a Python float and
-costs nothing. A single pose is the same code with nothing but floats.
+Constants, such as the many zeros and ones of DH tables, stay Python floats, so that operations on them cost nothing.
+The same code runs for a single pose, with floats only.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ Truth = Bool | bool  # what a comparison of entries gives
 
 
 class Entry(Protocol):
-    """A plain number, an array over the batch, or a symbol of a recording: what arithmetic works on entry by entry."""
+    """A plain number, an array over the batch, or a symbol of a recording, with element-wise arithmetic."""
 
-    # the other operand is Any: a float takes floats alone, an array all that numpy takes
+    # the other operand is Any, as a float accepts floats only, while an array accepts all operands of numpy
     def __add__(self, other: Any, /) -> Entry: ...
     def __radd__(self, other: Any, /) -> Entry: ...
     def __sub__(self, other: Any, /) -> Entry: ...
@@ -44,7 +44,7 @@ class Entry(Protocol):
 
 E = TypeVar("E", bound=Entry)
 
-_numpy: Any = np  # its functions take entries of every kind; its stubs do not know so
+_numpy: Any = np  # numpy's functions accept all kinds of entries, but its stubs do not say so
 absolute: Callable[[Entry], Entry] = _numpy.abs
 sign: Callable[[Entry], Entry] = _numpy.sign
 sqrt: Callable[[Entry], Entry] = _numpy.sqrt
@@ -58,7 +58,7 @@ where: Callable[[Any, Entry, Entry], Entry] = _numpy.where
 flip: Callable[[Entry, int], Entry] = _numpy.flip
 
 
-CHUNK = 8000  # poses worked on at once: long enough to hide the calls, short enough for a processor's cache
+CHUNK = 8000  # poses computed together: enough to hide the cost of calls, few enough for the cache
 
 
 def real_array(values: ArrayLike, name: str) -> Array:
@@ -70,7 +70,7 @@ def real_array(values: ArrayLike, name: str) -> Array:
         return values
     try:
         array = np.asarray(values)
-        if array.dtype.kind in "biufO":  # O: numbers that numpy does not know, such as fractions
+        if array.dtype.kind in "biufO":  # O: objects, such as fractions
             return array.astype(np.float64)
         kind = f"an array of {array.dtype}"
     except (TypeError, ValueError):
@@ -138,18 +138,17 @@ def cross(u: Sequence[Entry], v: Sequence[Entry]) -> list[Entry]:
 
 
 def cross_rows(a: Array, b: Array) -> Array:
-    """Vector products (..., 3), for which np.cross takes three times as long where they are few."""
-    ahead, behind = [1, 2, 0], [2, 0, 1]
-    product: Array = a[..., ahead] * b[..., behind] - a[..., behind] * b[..., ahead]
+    """Vector products (..., 3); for few vectors np.cross takes three times as long."""
+    following, preceding = [1, 2, 0], [2, 0, 1]
+    product: Array = a[..., following] * b[..., preceding] - a[..., preceding] * b[..., following]
     return product
 
 
 def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
     """Cosine and sine of an angle [rad].
 
-    For arrays through the tangent of the half angle: numpy has a vectorised tangent and
-    no vectorised double precision sine; the result differs from the library's by at most
-    2.3e-16 over several turns.
+    Arrays use the tangent of the half angle, because numpy has a vectorised tangent but no vectorised
+    double precision sine; the result differs from the library's by at most 2.3e-16 over several turns.
     """
     if isinstance(angle, float):
         return math.cos(angle), math.sin(angle)
@@ -160,22 +159,22 @@ def cos_sin(angle: Entry) -> tuple[Entry, Entry]:
 
 
 def wrap_angle(angle: E) -> E:
-    """An angle [rad] less its whole turns, in [-pi, pi].
+    """An angle [rad] without its whole turns, in [-pi, pi].
 
     >>> round(float(wrap_angle(7.0)), 6)
     0.716815
     """
-    less: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
-    return less
+    wrapped: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
+    return wrapped
 
 
 def numbers_within(count: Int) -> Int:
-    """0, 1, ... in each of groups, one behind the other, of so many each: (G,) -> (sum of count,)."""
+    """The numbers 0, 1, ... within consecutive groups of `count` items: (G,) -> (sum of count,)."""
     return np.asarray(np.arange(int(count.sum())) - np.repeat(np.cumsum(count) - count, count))
 
 
 def slices(count: int, size: int) -> list[slice]:
-    """From 0 to count, one after the other, of so many each and what is left.
+    """Consecutive slices from 0 to count of a size, with a shorter last one.
 
     >>> slices(5, 2)
     [slice(0, 2, None), slice(2, 4, None), slice(4, 5, None)]

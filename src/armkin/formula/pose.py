@@ -1,9 +1,8 @@
 """Poses as structures of arrays: twelve entries, each an array over the batch or a plain number.
 
-A batch of homogeneous transforms kept entry by entry lets numpy work on long contiguous
-arrays, and lets what is known to be constant (the zeros and ones that most DH tables are
-full of) stay a Python float and cost nothing. A single pose is the same code with
-nothing but floats.
+Storing a batch of homogeneous transforms entry by entry lets numpy work on long contiguous
+arrays. Constants, such as the many zeros and ones of DH tables, stay Python floats, so that
+operations on them cost nothing. The same code runs for a single pose, with floats only.
 
 A `Pose` is a list of twelve entries ``[r00, r10, r20, r01, r11, r21, r02, r12, r22, x, y, z]``:
 the x, y and z columns of the rotation, then the position.
@@ -72,7 +71,7 @@ def inverse(P: Pose) -> Pose:
 
 
 def write_pose(P: Pose, matrices: Array) -> None:
-    """Write a pose into ``out (..., 4, 4)``; entries broadcast."""
+    """Write a pose into ``matrices (..., 4, 4)``; entries broadcast."""
     entry: Any  # numpy takes any
     for k, entry in enumerate(P):
         matrices[..., k % 3, k // 3] = entry

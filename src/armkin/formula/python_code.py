@@ -1,4 +1,4 @@
-"""A recording as plain Python: for one pose a call of numpy costs more than what it computes."""
+"""Writes a recording as plain Python, because for one pose the calls of numpy would cost most of the time."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from armkin.formula.recording import FLIPS, Node, Recording, axes_of, index_before_flip
 
-# Operations on single numbers.
+# operations on single numbers
 _PYTHON = {
     "multiply": "{} * {}",
     "add": "{} + {}",
@@ -41,13 +41,13 @@ _PYTHON = {
     "where": "{1} if {0} else {2}",
 }
 _FUNCTIONS = {name: getattr(math, name) for name in ("sqrt", "cbrt", "tan", "atan2", "copysign")}
-MAX_BRACKETS = 20  # brackets within brackets, at most, that a line may have: Python's parser takes 200
+MAX_BRACKETS = 20  # deepest nesting of brackets in a line; Python's parser accepts 200
 
-Value = tuple[int, tuple[int, ...]]  # a node, by its id, on one of its branches
+Value = tuple[int, tuple[int, ...]]  # id of a node, and index of a branch
 
 
 class Step(NamedTuple):
-    """An operation on values or constants' digits."""
+    """An operation on values or on texts of constants."""
 
     output: Value
     op: str
@@ -55,14 +55,14 @@ class Step(NamedTuple):
 
 
 class Expression(NamedTuple):
-    """Python code of a value, and how many brackets within brackets it has."""
+    """Python code of a value, and the depth of its brackets."""
 
     code: str
     depth: int = 0
 
 
 def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
-    """Branch axes unrolled, one line a value that is used more than once: a function of the inputs as numbers."""
+    """The function of a recording for single numbers, with a line for each value that is used more than once."""
     steps, outputs = _unroll(recording)
     inputs: dict[Value, str] = {(id(node), ()): f"i{k}" for k, node in enumerate(recording.inputs)}
     lines, expressions = _write_lines(steps, _count_uses(steps, outputs), inputs)
@@ -76,7 +76,7 @@ def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
 def _write_lines(
     steps: list[Step], uses: Counter[Value | str], inputs: dict[Value, str]
 ) -> tuple[list[str], dict[Value, Expression]]:
-    """A line for each value that is used more than once or has too many brackets, and how every value is read."""
+    """Lines for values that are used more than once or nested too deeply, and the expression of every value."""
     expressions = {value: Expression(name) for value, name in inputs.items()}
     lines: list[str] = []
     for output, op, args in steps:
@@ -94,12 +94,12 @@ def _write_lines(
 
 
 def _expression(x: Value | str, expressions: dict[Value, Expression]) -> Expression:
-    """How a value or a constant's digits are read."""
+    """The expression of a value or of a constant."""
     return Expression(x) if isinstance(x, str) else expressions[x]
 
 
 def _count_uses(steps: list[Step], outputs: list[list[Value | str]]) -> Counter[Value | str]:
-    """How many times each value that leads to an output is read."""
+    """Number of uses of each value that an output depends on."""
     uses: Counter[Value | str] = Counter(value for branches in outputs for value in branches)
     for output, op, args in reversed(steps):
         if uses[output]:
@@ -108,11 +108,11 @@ def _count_uses(steps: list[Step], outputs: list[list[Value | str]]) -> Counter[
 
 
 def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
-    """The operations on single branches, those on signs of branches left out; and what each output is on each."""
+    """The operations on single branches without flips and signs, and the values of each output on its branches."""
     same: dict[Value, Value | str] = {}
 
     def value(x: Any, index: tuple[int, ...]) -> Value | str:
-        """What an argument is on a branch: a value, or a constant's digits."""
+        """The argument on a branch: a value, or the text of a constant."""
         axes = axes_of(x)
         last = index[len(index) - len(axes) :]
         place = tuple(0 if size == 1 else i for size, i in zip(axes, last, strict=True))
@@ -139,11 +139,11 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
 
 
 def _shorten(op: str, args: list[Value | str], minus: dict[Value | str, Value | str]) -> tuple[str, list[Value | str]]:
-    """An operation without signs of branches; "same": it is its argument. minus: negated values, before that."""
+    """A simpler equal operation; "same": the result is its argument. minus: arguments of negated values."""
     if op == "multiply":
-        for sign, shorter in (("1.0", "same"), ("-1.0", "negative")):
+        for sign, simpler in (("1.0", "same"), ("-1.0", "negative")):
             if sign in args:
-                return shorter, [args[1 - args.index(sign)]]
+                return simpler, [args[1 - args.index(sign)]]
     if op == "add":
         for negated, summand in (args, args[::-1]):
             if negated in minus:
@@ -154,7 +154,7 @@ def _shorten(op: str, args: list[Value | str], minus: dict[Value | str, Value | 
 def function_of(
     parameters: list[str], lines: list[str], outputs: list[str], scope: dict[str, Any]
 ) -> Callable[..., tuple[Any, ...]]:
-    """A function made of these lines. They consist of names and numbers written by this package alone."""
+    """A function made of these lines, which consist of names and numbers written by this package."""
     source = "\n    ".join([f"def run({', '.join(parameters)}):", *lines, f"return ({', '.join(outputs)},)"])
     exec(_compile_source(source), scope)
     run: Callable[..., tuple[Any, ...]] = scope["run"]
@@ -163,5 +163,5 @@ def function_of(
 
 @lru_cache(maxsize=128)
 def _compile_source(source: str) -> CodeType:
-    """An arm that is read again, or another of its size, has the same lines: compiling them is most of the time."""
+    """Compiled source; cached, as compiling takes most of the time and similar arms have the same source."""
     return compile(source, "<formula>", "exec")

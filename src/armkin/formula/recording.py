@@ -1,10 +1,9 @@
-"""Formulas recorded: a function is run once on symbols, and the operations that it asks for are kept as a list.
+"""Records formulas: runs a function once on symbols and keeps its operations as a list.
 
-The closed forms and the forward kinematics are written as ordinary functions of arrays.
-Called on arrays they spend much of their time in Python: one call for every product of two
-numbers of which one is a known zero. Called once on `Node` symbols they leave behind the
-list of what really has to be computed, equal operations once. `numpy_code`, `python_code` and
-`c_and_js_code` write that list as programs.
+The closed forms and the forward kinematics are ordinary functions of arrays. Called on arrays,
+they would spend much time in Python, also for products with constant zeros. Called once on
+`Node` symbols, they give a list of the necessary operations, without repetitions.
+`numpy_code`, `python_code` and `c_and_js_code` write this list as programs.
 """
 
 from __future__ import annotations
@@ -17,15 +16,15 @@ from typing import Any
 import numpy as np
 
 BOOLEAN = {"less", "less_equal", "greater", "greater_equal", "bitwise_or", "bitwise_and", "equal"}
-ODD = {"arctan2", "rint", "tan", "cbrt"}  # functions whose sign is that of their first argument
+ODD = {"arctan2", "rint", "tan", "cbrt"}  # functions that are odd in their first argument
 COMMUTING = {"multiply", "add", "bitwise_or", "bitwise_and"}
 
 
-FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # names of operations that give the same values of the other branch
+FLIPS = {f"flip_{axis}": axis for axis in range(3)}  # operations that exchange branches on an axis
 
 
 def index_before_flip(op: str, index: tuple[int, ...], axes: tuple[int, ...]) -> tuple[int, ...]:
-    """Where the value that stands on a branch after a flip stood before it.
+    """The branch, before a flip, of the value at a branch after the flip.
 
     >>> index_before_flip("flip_1", (0, 0, 0), (2, 2, 1))
     (0, 1, 0)
@@ -38,10 +37,10 @@ Sign = Any  # 1.0, -1.0 or an array of them on branch axes
 
 
 class Node(np.lib.mixins.NDArrayOperatorsMixin):
-    """An array that is not there yet: what numpy is asked to do with it is recorded.
+    """A symbol for an array; operations of numpy on it are recorded.
 
     axes: lengths of the branch axes in front of the batch axis, () for a plain (N,) array. number: of operations
-    recorded before; inputs count from below zero.
+    recorded before; negative for inputs.
     """
 
     def __init__(self, trace: Trace, op: str, args: tuple[Any, ...], axes: tuple[int, ...], number: int) -> None:
@@ -55,8 +54,8 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> Any:
         if function is np.any:
-            return True  # what is not known yet may be true of some pose
-        if function is np.flip:  # the flip of a branch axis is what stands on the other branch
+            return True  # an unknown value may be true for some pose
+        if function is np.flip:  # flipping a branch axis exchanges its branches
             x, axis = inputs
             return x if axis >= len(x.axes) or x.axes[axis] == 1 else self.trace.record(f"flip_{axis}", (x,))
         if function is not np.where or len(inputs) != 3:
@@ -65,16 +64,16 @@ class Node(np.lib.mixins.NDArrayOperatorsMixin):
 
 
 class Trace:
-    """The operations recorded so far, equal ones once."""
+    """The operations recorded so far, without repetitions."""
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.nodes_by_key: dict[tuple[Any, ...], Node] = {}
 
     def simplify(self, op: str, inputs: Sequence[Any]) -> Any:
-        """Record an operation, or what is equal to it and shorter: no zeros, no ones, signs moved outwards.
+        """Record an operation or a shorter equal one, without zeros and ones, and with signs moved outwards.
 
-        Signs are those of branches, too: ``(s a) (s b)`` is computed once for both values of s.
+        Signs include those of branches: ``(s a) (s b)`` is computed once for both values of s.
         """
         if op in ("bitwise_and", "bitwise_or"):
             return self._combine_truths(op, *inputs)
@@ -85,7 +84,7 @@ class Trace:
         return self._signs_outwards(op, inputs)
 
     def _signs_outwards(self, op: str, inputs: Sequence[Any]) -> Any:
-        """Record an operation on what its arguments are without their signs."""
+        """Record an operation on its arguments without their signs."""
         (s, a), (t, b) = _split_sign(inputs[0]), _split_sign(inputs[-1])
         if op == "negative":
             return self._apply_sign(a, -s)
@@ -100,9 +99,10 @@ class Trace:
         return self._sum(s, a, -t if op == "subtract" else t, b)
 
     def _combine_truths(self, op: str, x: Any, y: Any) -> Any:
-        """``x & y`` or ``x | y``: without an operation where one of the two is known."""
+        """``x & y`` or ``x | y``, without an operation if one argument is a constant."""
         for constant, value in ((x, y), (y, x)):
-            if isinstance(constant, bool | np.bool_):  # one argument is known: it decides, or the other does
+            # a constant decides the result, or leaves it to the other argument
+            if isinstance(constant, bool | np.bool_):
                 return value if bool(constant) == (op == "bitwise_and") else bool(constant)
         return self.record(op, (x, y))
 
@@ -143,7 +143,7 @@ class Trace:
         return x if sign > 0 else self.record("negative", (x,))
 
     def _product(self, a: Any, b: Any) -> Any:
-        """The product of two factors; constant ones are multiplied now: ``k1 (k2 x)`` is one operation."""
+        """The product of two factors, with constants combined: ``k1 (k2 x)`` is one operation."""
         for k, x in ((a, b), (b, a)):
             if not isinstance(k, Node) and isinstance(x, Node) and x.op == "multiply":
                 for inner, y in (x.args, x.args[::-1]):
@@ -152,9 +152,9 @@ class Trace:
         return self.record("multiply", (a, b))
 
     def record(self, op: str, inputs: Sequence[Any]) -> Node:
-        """The node of an operation, which is one for equal inputs."""
+        """The node of an operation; equal inputs give the same node."""
         if op in COMMUTING and _commuting_key(inputs[0]) > _commuting_key(inputs[1]):
-            inputs = inputs[::-1]  # equal ones have equal keys: constants first, then what was recorded first
+            inputs = inputs[::-1]  # a fixed order gives equal keys: constants first, then older nodes
         key = (op, *[id(x) if isinstance(x, Node) else _constant_key(x) for x in inputs])
         node = self.nodes_by_key.get(key)
         if node is None:
@@ -175,7 +175,7 @@ def _ndim(x: Any) -> int:
 
 
 def branch_signs(x: Any, zeros: bool = False) -> bool:
-    """Whether a node is a value times an array of signs on branch axes; zeros: of which some may be zero."""
+    """Whether a node is a value times an array of signs on branch axes; zeros: whether zeros count as signs."""
     if not isinstance(x, Node) or x.op != "multiply" or not _ndim(x.args[0]):
         return False
     size = np.abs(x.args[0])
@@ -183,7 +183,7 @@ def branch_signs(x: Any, zeros: bool = False) -> bool:
 
 
 def _split_sign(x: Any) -> tuple[Sign, Any]:
-    """A value as a sign and what is left: minus moves out of nodes, signs of branches out of nodes and constants."""
+    """A value as a sign and a remaining factor; the sign may depend on branches."""
     if isinstance(x, Node) and x.op == "negative":
         return -1.0, x.args[0]
     if isinstance(x, Node):
@@ -194,7 +194,7 @@ def _split_sign(x: Any) -> tuple[Sign, Any]:
 
 
 def _sign_product(s: Sign, t: Sign) -> Sign:
-    """The product of two signs, without branch axes on which it is the same."""
+    """The product of two signs, without branch axes on which it is constant."""
     sign = s * t
     for axis in range(_ndim(sign)):
         first = sign.take([0], axis)
@@ -207,7 +207,7 @@ def _is_zero(x: Any) -> bool:
 
 
 def _constant_key(x: Any) -> Any:
-    """A key of a constant's exact bits: -0.0 is not 0.0."""
+    """A key of the exact bits of a constant, different for -0.0 and 0.0."""
     return x.hex() if isinstance(x, float) else (np.shape(x), np.asarray(x).tobytes())
 
 
@@ -222,8 +222,8 @@ def axes_of(x: Any) -> tuple[int, ...]:
 class Recording:
     """A formula as a list of operations.
 
-    inputs: one `Node` each. outputs: a `Node`, an array or a number each. nodes: all operations that the
-    outputs depend on, arguments before results; inputs are not among them.
+    inputs: nodes. outputs: nodes, arrays or numbers. nodes: all operations that the outputs depend on, without the
+    inputs, arguments before results.
     """
 
     inputs: list[Node]
@@ -232,7 +232,7 @@ class Recording:
 
 
 def record(formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> Recording:
-    """Run a formula of a list of arrays once on that many symbols."""
+    """The recording of a formula of a list of `inputs` arrays."""
     trace = Trace()
     symbols = [Node(trace, "input", (), (), k - inputs) for k in range(inputs)]
     outputs = list(formula(list(symbols)))

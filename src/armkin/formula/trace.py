@@ -1,4 +1,4 @@
-"""A formula run fast: recorded once, as numpy code for batches and as plain Python for one pose."""
+"""Runs a recorded formula, as numpy code for batches and as plain Python for one pose."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from armkin.formula.arrays import Array
 if TYPE_CHECKING:
     from armkin.formula import numpy_code
 
-SMALL_BATCH = 256  # poses of a batch up to which its buffers are kept: to make them costs more than to fill them
-UNCOPIED_ELEMENTS = 512  # elements of numpy's buffers: it copies operands repeated on a branch axis if two rows fit
-CACHE = 4_000_000  # size [bytes] of all buffers: 4 to 6 MB cost the same with 1 MB a core, 9 MB more
+SMALL_BATCH = 256  # poses of a batch up to which its buffers are kept, as creating them costs more than filling
+UNCOPIED_ELEMENTS = 512  # elements of numpy's buffers; with larger ones it copies operands repeated on branch axes
+CACHE = 4_000_000  # size [bytes] of all buffers; 4 to 6 MB are equally fast with 1 MB for each core, 9 MB slower
 LENGTHS = 16  # lengths of batches for which a thread keeps buffers
 
 
 class StraightLineCode:
-    """A recorded formula as code without branches or loops: for batches, and for one pose."""
+    """A recorded formula as code without branches or loops, for batches and for one pose."""
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
         """formula: takes a list of that many arrays, returns a sequence of arrays or numbers."""
@@ -36,12 +36,12 @@ class StraightLineCode:
         self._thread_buffers = threading.local()
 
     def at_once(self) -> int:
-        """How many poses are worked on at once: fewer than `CHUNK` where buffers of so many would leave the cache."""
+        """Number of poses computed together: `CHUNK`, or fewer if their buffers would not fit the cache."""
         size = sum(math.prod(b.axes) * np.dtype(b.dtype).itemsize for b in self._numpy_code()[1] if b.full_index < 0)
         return min(arrays.CHUNK, max(CACHE // size, SMALL_BATCH))
 
     def _numpy_code(self) -> tuple[numpy_code.Run, list[numpy_code.Buffer]]:
-        """The code for batches, and what buffers it needs."""
+        """The code for batches, and the buffers that it needs."""
         from armkin.formula import numpy_code
 
         if self._batch is None:
@@ -49,7 +49,7 @@ class StraightLineCode:
         return self._batch
 
     def workspace(self, length: int) -> list[NDArray[Any]]:
-        """Buffers for batches of that length, to be passed to `run`; every thread has its own, and keeps small ones."""
+        """Buffers of `run` for batches of a length; every thread has its own, and small ones are kept."""
         from armkin.formula import numpy_code
 
         _, needed = self._numpy_code()
@@ -64,18 +64,18 @@ class StraightLineCode:
         return buffers
 
     def run(self, inputs: Sequence[Any], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:
-        """The formula's outputs for inputs (N,); they stand in the workspace until its next use."""
+        """The formula's outputs for inputs (N,), which are valid until the workspace is used again."""
         assert self._batch is not None  # written for the workspace
         if len(inputs[0]) < 2 * UNCOPIED_ELEMENTS:
             return self._batch[0](*inputs, *workspace)
-        before = np.setbufsize(UNCOPIED_ELEMENTS)
+        previous_size = np.setbufsize(UNCOPIED_ELEMENTS)
         try:
             return self._batch[0](*inputs, *workspace)
         finally:
-            np.setbufsize(before)
+            np.setbufsize(previous_size)
 
     def run_exactly(self, inputs: Sequence[Any]) -> list[Array]:
-        """The outputs for inputs (N,), to the last digit those of `single_pose_function`, in arrays of their own."""
+        """The outputs for inputs (N,) as new arrays, identical to `single_pose_function` in the last digit."""
         from armkin.formula import numpy_code
 
         if self._exact is None:
@@ -108,9 +108,9 @@ class StraightLineCode:
 
 
 class LazyCode:
-    """Straight-line code that is recorded at the first batch of 64 or at the fifth call: it takes milliseconds.
+    """Straight-line code that is recorded at the first batch of 64 poses or the fifth call, as it takes milliseconds.
 
-    Recorded or not, it is computed by the same operations of numpy, so that no result depends on what was asked before.
+    The same operations of numpy compute the results before and after, so that results do not depend on earlier calls.
     """
 
     def __init__(self, formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> None:
@@ -124,7 +124,7 @@ class LazyCode:
         return self.record_now() if batch >= 64 or self._calls > 4 or self._code is not None else None
 
     def record_now(self) -> StraightLineCode:
-        """The recorded code, recorded now if it is not yet."""
+        """The recorded code; recorded at the first call."""
         if self._code is None:
             self._code = StraightLineCode(self._formula, self._inputs)
         return self._code
