@@ -1,12 +1,12 @@
-"""Joint values to motor pulses and back, and what the rounding costs at the tip.
+"""Converts joint values to motor pulses and back, and computes the error of the tip by rounding.
 
-A motor's exact pulse is linear in the joints,
+The exact pulse of a motor is linear in the joint values,
 
     x = motor_bias + motor_gain (q - home)
 
-with the bias 0 for steppers, whose pulses are counted from home, and the pulse width at home [us]
-for RC servos, the count at home for bus servos. Motors and joints need not be one to one (belts,
-differentials, two motors on one shoulder): the joints follow from the pulses through the pseudoinverse of the matrix.
+where the bias is 0 for steppers, whose pulses are counted from home, the pulse width at home [us] for RC servos, and
+the count at home for bus servos. Motors and joints need not correspond one to one (belts, differentials, two motors at
+one shoulder); the pseudoinverse of the matrix gives the joints from the pulses.
 """
 
 from __future__ import annotations
@@ -29,20 +29,20 @@ if TYPE_CHECKING:
 
 Pulses = NDArray[np.int64]
 
-_MAX_PULSES = 2.0**53  # number of pulses beyond which a double no longer counts whole ones
-_HALF = 1e-9  # distance [pulses] from a half that is a half, as degrees have no exact radians
+_MAX_PULSES = 2.0**53  # number of pulses up to which doubles represent all whole numbers
+_HALF = 1e-9  # distance [pulses] from a half that counts as a half, as degrees have no exact radians
 _CANDIDATES = 4096  # pulse vectors that `best_pulses` tries for one pose
-_AT_ONCE = 1 << 16  # tips that `best_pulses` computes in one go
+_AT_ONCE = 1 << 16  # tips that `best_pulses` computes together
 
 
 @dataclass(frozen=True)
 class Rounding:
-    """Joint values as whole pulses: where the motors go, and where the tip goes with them.
+    """Joint values rounded to whole pulses, with the exact and the actual tip.
 
     Attributes:
         joints: (..., n) [rad | mm] as asked.
         pulses: (..., motors) [steps from home | us | counts].
-        actual_joints: (..., n) [rad | mm] where those pulses put the joints.
+        actual_joints: (..., n) [rad | mm] joint values at those pulses.
         theoretical: (..., 3) [mm] the tip for the exact joints.
         actual: (..., 3) [mm] the tip for the actual joints.
     """
@@ -55,7 +55,7 @@ class Rounding:
 
     @property
     def difference(self) -> Array:
-        """(..., 3) [mm] how far the actual tip is off along each axis, without sign."""
+        """(..., 3) [mm] absolute error of the actual tip along each axis."""
         return np.abs(self.actual - self.theoretical)
 
     @property
@@ -66,7 +66,7 @@ class Rounding:
 
 @dataclass(frozen=True)
 class Best:
-    """The pulses whose tip is nearest to the exact one, beside plain rounding.
+    """The pulses whose tip is nearest to the exact tip, and plainly rounded pulses.
 
     Attributes:
         chosen: the pulses with the nearest tip.
@@ -80,7 +80,7 @@ class Best:
 
     @property
     def gain(self) -> Array:
-        """(...) [mm] how much nearer the chosen pulses are than the rounded ones; never negative."""
+        """(...) [mm] reduction of the error by the chosen pulses; never negative."""
         return self.rounded.error - self.chosen.error
 
 
@@ -105,8 +105,8 @@ def pulses(arm: Arm, q: ArrayLike) -> Pulses:
     >>> armkin.pulses(arm, np.deg2rad([-30, 5, -5])).tolist()
     [-1067, -10144, 5667]
     """
-    exact, slack = _exact_and_slack(arm, q)
-    magnitude = np.floor(np.abs(exact) + (0.5 + slack))
+    exact, tolerance = _exact_and_slack(arm, q)
+    magnitude = np.floor(np.abs(exact) + (0.5 + tolerance))
     return np.copysign(magnitude, exact).astype(np.int64)
 
 
@@ -116,9 +116,9 @@ def exact_pulses(arm: Arm, q: ArrayLike) -> Array:
 
 
 def joints(arm: Arm, p: ArrayLike) -> Array:
-    """Joint values where the motors stand at these pulses.
+    """Joint values of motors at these pulses.
 
-    With more motors than joints these are the joints that fit all motors best (least squares).
+    With more motors than joints, the joints are those that fit all motors best (least squares).
 
     Args:
         arm: the arm, as `armkin.load` gives it.
@@ -138,43 +138,43 @@ def joints(arm: Arm, p: ArrayLike) -> Array:
     """
     inverse = joints_per_pulse(arm)
     values = arrays.real_array(p, "pulses")
-    m = len(arm.motor_gain)
-    if values.ndim == 0 or values.shape[-1] != m:
+    count = len(arm.motor_gain)
+    if values.ndim == 0 or values.shape[-1] != count:
         given_text = "a single number" if values.ndim == 0 else f"{values.shape[-1]}"
-        raise UsageError(f"{arm.name} has {m} motors: expected {m} pulses on the last axis, got {given_text}")
+        raise UsageError(f"{arm.name} has {count} motors: expected {count} pulses on the last axis, got {given_text}")
     if not np.all(np.abs(values) <= _MAX_PULSES):
         raise UsageError("pulses must be finite, and at most 2^53 from 0")
     offset = values - arm.motor_bias
     q = offset @ inverse.T
-    if m > arm.n:
+    if count > arm.n:
         _check_agreement(arm, q, offset)
     return np.asarray(arm.home + q)
 
 
 def _check_agreement(arm: Arm, q: Array, offset: Array) -> None:
-    """Raise UsageError where motors are farther from joint values q (..., n) than their rounding explains.
+    """Raise UsageError if motors deviate from joint values q (..., n) by more than their rounding.
 
     offset: (..., motors) their pulses from home.
     """
-    apart = np.abs(q @ arm.motor_gain.T - offset)
-    # Each motor is rounded by up to half a pulse; least squares can gather all of it in one.
-    if np.any(apart > 0.5 * np.sqrt(len(arm.motor_gain)) + _HALF):
-        worst = motor_names(arm)[np.unravel_index(np.argmax(apart), apart.shape)[-1]]
+    deviation = np.abs(q @ arm.motor_gain.T - offset)
+    # each motor is rounded by up to half a pulse, and least squares may add all of this in one motor
+    if np.any(deviation > 0.5 * np.sqrt(len(arm.motor_gain)) + _HALF):
+        worst = motor_names(arm)[np.unravel_index(np.argmax(deviation), deviation.shape)[-1]]
         raise UsageError(
-            f"the pulses contradict each other: motor {worst} is {apart.max():.1f} pulses from where "
+            f"the pulses contradict each other: motor {worst} is {deviation.max():.1f} pulses from where "
             "the other motors put its joints; motors of one joint must agree"
         )
 
 
 def legal_with_same_pulses(arm: Arm, q: ArrayLike) -> Array:
-    """Joint values within the limits that have the same pulses, if there are: whole steps may be half a step outside.
+    """Joint values within the limits that have the same pulses, if any, as rounding may exceed a limit by half a step.
 
     q: (..., n) [rad | mm]. Returns (..., n); q itself where its nearest legal values have other pulses.
     """
     values = np.asarray(q, dtype=float)
-    inside = np.clip(values, arm.lower, arm.upper)
-    same = (pulses(arm, inside) == pulses(arm, values)).all(axis=-1, keepdims=True)
-    return np.where(same, inside, values)
+    clipped = np.clip(values, arm.lower, arm.upper)
+    has_same_pulses = (pulses(arm, clipped) == pulses(arm, values)).all(axis=-1, keepdims=True)
+    return np.where(has_same_pulses, clipped, values)
 
 
 def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
@@ -199,12 +199,12 @@ def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:
 
 
 def best_pulses(arm: Arm, q: ArrayLike) -> Best:
-    """Among the pulse vectors around the exact one, that whose tip is nearest to the exact tip.
+    """The pulses around the exact ones whose tip is nearest to the exact tip.
 
     The search is complete over its neighbourhood: every motor takes the two pulses on either side of its exact value
-    (one on either side for more than six motors). Only the tip's position counts, its direction may turn by as much as
-    those pulses are worth. A vector that leaves the joint limits or the servos' travel farther than plain rounding does
-    is not considered, nor one that makes two motors of a joint work against each other.
+    (one on either side for more than six motors). Only the position of the tip counts; its orientation changes by at
+    most these pulses. Pulses are not considered if they exceed the joint limits or the travel of a servo by more than
+    plain rounding does, or if two motors of a joint would work against each other.
 
     Args:
         arm: the arm, as `armkin.load` gives it.
@@ -219,27 +219,28 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
     """
     exact, _ = _exact_and_slack(arm, q)
     values = as_joints(arm, q)
-    m = len(arm.motor_gain)
-    steps = (-1.0, 0.0, 1.0, 2.0) if 4**m <= _CANDIDATES else (0.0, 1.0)
-    if len(steps) ** m > _CANDIDATES:
+    motor_count = len(arm.motor_gain)
+    steps = (-1.0, 0.0, 1.0, 2.0) if 4**motor_count <= _CANDIDATES else (0.0, 1.0)
+    if len(steps) ** motor_count > _CANDIDATES:
         raise UsageError(
-            f"{arm.name} has {m} motors: the best pulses are searched among the neighbours of up to 12", motors=m
+            f"{arm.name} has {motor_count} motors: the best pulses are searched among the neighbours of up to 12",
+            motors=motor_count,
         )
-    around = np.array(list(product(steps, repeat=m)))
-    flat_q, flat_x = values.reshape(-1, arm.n), exact.reshape(-1, m)
-    chosen = np.empty((len(flat_q), m), dtype=np.int64)
-    block = max(1, _AT_ONCE // len(around))
+    offsets = np.array(list(product(steps, repeat=motor_count)))
+    flat_q, flat_x = values.reshape(-1, arm.n), exact.reshape(-1, motor_count)
+    chosen = np.empty((len(flat_q), motor_count), dtype=np.int64)
+    block = max(1, _AT_ONCE // len(offsets))
     for start in range(0, len(flat_q), block):
-        part = slice(start, start + block)
-        chosen[part] = _nearest_pulses(arm, flat_q[part], flat_x[part], around)
-    return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(around) + 1)
+        rows = slice(start, start + block)
+        chosen[rows] = _nearest_pulses(arm, flat_q[rows], flat_x[rows], offsets)
+    return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(offsets) + 1)
 
 
 def resolution(arm: Arm) -> Array:
-    """What one pulse is worth at each joint: (n,) [rad | mm].
+    """Resolution of each joint, its motion for one pulse: (n,) [rad | mm].
 
-    Rounding the motors puts a joint within half of this of its exact value. With one motor a joint
-    it is the joint's step; where several motors turn a joint, their steps add up.
+    Rounding the motors changes a joint by at most half of the resolution. With one motor for a joint it is the step of
+    the joint; if several motors move a joint, their steps add up.
     """
     return np.asarray(np.abs(joints_per_pulse(arm)).sum(axis=1))
 
@@ -247,8 +248,8 @@ def resolution(arm: Arm) -> Array:
 def motor_accel(arm: Arm) -> Array:
     """Greatest acceleration of every motor: (motors,) [counts/s^2].
 
-    That of a motor which turns several joints suits the most delicate of them, whichever moves: so a hold,
-    of which the board knows motors only, is within the joints' max_accel.
+    A motor that moves several joints gets the smallest acceleration of them, whichever moves. A feed hold, which the
+    board computes from motors only, is therefore within the joints' max_accel.
     """
     per_joint = np.abs(arm.motor_gain) * arm.max_accel
     return np.asarray(np.where(per_joint > 0, per_joint, np.inf).min(axis=1))
@@ -277,13 +278,13 @@ def pulse_range(arm: Arm) -> Array:
 
 
 def outside_travel(arm: Arm, p: ArrayLike) -> NDArray[np.bool_]:
-    """Which pulses no servo can take: (..., motors) -> (..., motors) bool. Steppers have no such range."""
+    """Which pulses are outside the travel of a servo: (..., motors) -> (..., motors) bool; never for steppers."""
     values, allowed = np.asarray(p), pulse_range(arm)
     return np.asarray((values < allowed[:, 0]) | (values > allowed[:, 1]))
 
 
 def _exact_and_slack(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
-    """Pulses before rounding, and how far arithmetic may have moved them: (..., motors) twice."""
+    """Pulses before rounding, and bounds of their arithmetic error: (..., motors) twice."""
     joints_per_pulse(arm)
     values = as_joints(arm, q)
     if not np.all(np.isfinite(values)):
@@ -296,27 +297,29 @@ def _exact_and_slack(arm: Arm, q: ArrayLike) -> tuple[Array, Array]:
 
 
 def undriven_joints(arm: Arm) -> list[str]:
-    """Names of the joints that no motor turns."""
+    """Names of the joints that no motor moves."""
     return [name for name, column in zip(arm.joint_names, arm.motor_gain.T, strict=True) if not column.any()]
 
 
 @lru_cache(maxsize=32)
 def joints_per_pulse(arm: Arm) -> Array:
-    """How far a pulse of each motor moves each joint: (n, motors) [rad | mm], read-only: found once for an arm.
+    """Motion of each joint for a pulse of each motor: (n, motors) [rad | mm], read-only, cached.
 
     Raises UsageError if the motors do not determine the joints.
     """
-    gain, still = arm.motor_gain, undriven_joints(arm)
-    if still:
-        lacks = "drives" if len(still) == arm.n else f"motor for {', '.join(still)}"
-        raise UsageError(f"{arm.name} has no {lacks}; add motors: to its file, or drive: to each joint", undriven=still)
-    # In units of each joint's own pulse, so that rad and mm, or coarse and fine drives, compare.
+    gain, idle = arm.motor_gain, undriven_joints(arm)
+    if idle:
+        missing = "drives" if len(idle) == arm.n else f"motor for {', '.join(idle)}"
+        raise UsageError(
+            f"{arm.name} has no {missing}; add motors: to its file, or drive: to each joint", undriven=idle
+        )
+    # scale by the pulses of each joint, so that rad and mm, and coarse and fine drives, are comparable
     scale = np.abs(gain).max(axis=0)
     if np.linalg.matrix_rank(gain / scale) < arm.n:
         raise UsageError(
             f"{arm.name}'s motors do not determine its joints; give it as many independent motors as joints"
         )
-    if np.count_nonzero(gain) == len(gain) == arm.n:  # one to one: exact, without a factorisation
+    if np.count_nonzero(gain) == len(gain) == arm.n:  # one motor for each joint: exact without a factorisation
         per_pulse = np.divide(1.0, gain, out=np.zeros_like(gain), where=gain != 0).T
     else:
         per_pulse = np.asarray(np.linalg.pinv(gain / scale) / scale[:, None])
@@ -325,28 +328,28 @@ def joints_per_pulse(arm: Arm) -> Array:
 
 
 def _nearest_pulses(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
-    """Per pose, the neighbouring pulses with the nearest tip: (N, motors)."""
+    """The neighbouring pulses with the nearest tip for each posture: (N, motors)."""
     rounded = pulses(arm, q).astype(float)
-    near = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + corners], axis=1)  # (N, C, motors)
-    actual = arm.home + (near - arm.motor_bias) @ joints_per_pulse(arm).T
+    candidates = np.concatenate([rounded[:, None], np.floor(exact)[:, None] + corners], axis=1)  # (N, C, motors)
+    actual = arm.home + (candidates - arm.motor_bias) @ joints_per_pulse(arm).T
     tip = position(arm, actual)
     distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)
-    distance[_is_worse_than_rounded(arm, near, actual)] = np.inf
-    # The rounded vector comes first, and argmin keeps the first of equals.
-    pick = np.argmin(distance, axis=1)
-    improved = distance[np.arange(len(q)), pick] < distance[:, 0] * (1 - 1e-12)
-    return np.asarray(near[np.arange(len(q)), np.where(improved, pick, 0)])
+    distance[_is_worse_than_rounded(arm, candidates, actual)] = np.inf
+    # rounded pulses come first, and argmin returns the first of equal values
+    best = np.argmin(distance, axis=1)
+    is_improved = distance[np.arange(len(q)), best] < distance[:, 0] * (1 - 1e-12)
+    return np.asarray(candidates[np.arange(len(q)), np.where(is_improved, best, 0)])
 
 
-def _is_worse_than_rounded(arm: Arm, near: Array, actual: Array) -> NDArray[np.bool_]:
-    """Which pulses near (N, C, motors), at joints actual (N, C, n), leave limits or travel, or make motors of a joint
-    work against each other, by more than the first ones do: (N, C)."""
+def _is_worse_than_rounded(arm: Arm, candidates: Array, actual: Array) -> NDArray[np.bool_]:
+    """Which candidates (N, C, motors), at joints actual (N, C, n), exceed limits or travel, or make motors of a joint
+    work against each other, by more than the first candidate does: (N, C)."""
     allowed = pulse_range(arm)
     overrun = np.maximum(arm.lower - actual, actual - arm.upper).max(axis=-1)
-    overdrive = np.maximum(allowed[:, 0] - near, near - allowed[:, 1]).max(axis=-1)
-    strain = np.abs((actual - arm.home) @ arm.motor_gain.T + arm.motor_bias - near).max(axis=-1)
+    excess = np.maximum(allowed[:, 0] - candidates, candidates - allowed[:, 1]).max(axis=-1)
+    strain = np.abs((actual - arm.home) @ arm.motor_gain.T + arm.motor_bias - candidates).max(axis=-1)
     tolerance = 1e-9
-    worse = overrun > np.maximum(overrun[:, :1], 0.0) + tolerance
-    worse |= overdrive > np.maximum(overdrive[:, :1], 0.0)
-    worse |= strain > np.maximum(strain[:, :1], 0.5 - 1e-6)
-    return np.asarray(worse)
+    is_worse = overrun > np.maximum(overrun[:, :1], 0.0) + tolerance
+    is_worse |= excess > np.maximum(excess[:, :1], 0.0)
+    is_worse |= strain > np.maximum(strain[:, :1], 0.5 - 1e-6)
+    return np.asarray(is_worse)

@@ -1,12 +1,12 @@
-"""An arm's formulas as machine code, built on this computer: `armkin.compile`.
+"""`armkin.compile`: the formulas of an arm as machine code, compiled on this computer.
 
-compiled_arm.py      `compile`, and what it returns
+compiled_arm.py      `compile`, and the compiled arm
 joint_functions.py   poses, positions and clearances of joint values
 one_target.py        one target at a time, in microseconds
-elimination_rows.py  an elimination's branches for targets on an edge, which Python examines
-batch_results.py     results of a batch, as `Solutions` has them
+elimination_rows.py  branches of an elimination in C, for targets on an edge that Python examines
+batch_results.py     results of a batch in the layout of `Solutions`
 table_lines.py       columns as lines of text
-least_motion.py      of many branches those that move the joints least
+least_motion.py      the branches that move the joints least
 c_source.py          the C file: the formulas of `armkin.export.c`, and the loop over a batch in parts/
-toolchain.py         the system's compiler, and the folder of what it has built
+toolchain.py         the system's compiler, and the cache of libraries
 """

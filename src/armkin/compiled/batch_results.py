@@ -1,8 +1,8 @@
 """Results of a batch in the layout of `armkin.Solutions`, with room to grow in place.
 
-How many columns a batch needs is known only when all of it is solved: an elimination finds up to 16 branches,
-seldom as many; an edge may add one. The memory behind the arrays is taken for more, and the system gives it only
-where something is written: a million poses need no second copy of their results.
+The number of columns is known only after the whole batch is solved: an elimination finds up to 16 branches, usually
+fewer, and an edge may add one. Large arrays reserve memory for more columns, which the system provides only when it is
+written, so that a million poses need no second copy of their results.
 """
 
 from __future__ import annotations
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.answers.solutions import Solutions
 
-ROOM = 24  # columns that a large result has room for from the start: to enlarge it would take its memory twice
-MOVABLE = 32_000_000  # size [bytes] up to which a result is enlarged by a copy: allocators reuse the memory given back
-BLOCK_ROWS = 4096  # rows moved at once
+ROOM = 24  # columns reserved for a large result, as enlarging it later would need its memory twice
+MOVABLE = 32_000_000  # size [bytes] up to which a result is enlarged by a copy, as allocators reuse freed memory
+BLOCK_ROWS = 4096  # rows moved together
 
 
 class Results:
@@ -31,7 +31,7 @@ class Results:
         self.free, self.complete = np.zeros((N, n), bool), np.ones(N, bool)
 
     def _allocate(self, room: int) -> None:
-        """Memory for that many columns."""
+        """Reserve memory for `room` columns."""
         N, n = self.N, self.n
         self._room = room
         self._memory = (np.empty(N * room * n), np.empty(N * room, bool), np.empty(N * room, bool))
@@ -47,11 +47,11 @@ class Results:
         self.branch: NDArray[np.int8] = self._indices[: N * B].reshape(N, B)
 
     def widen(self, B: int) -> None:
-        """At least B columns; new ones are empty."""
+        """Grow to at least B columns; new columns are empty."""
         if B <= self.B:
             return
         narrow_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
-        before = self.B
+        old_count = self.B
         self.B = B
         if self._room < B:
             self._allocate(2 * B)
@@ -59,15 +59,15 @@ class Results:
             self._shape_views()
         wide_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
         pairs = zip(narrow_arrays, wide_arrays, (math.nan, False, False, -1), strict=True)
-        for narrow, wide, none in pairs:
-            # rows move from the end on: each goes to a place that rows behind it have left
+        for narrow, wide, empty in pairs:
+            # move rows from the end on, so that no row overwrites one that is not moved yet
             for start in reversed(range(0, self.N, BLOCK_ROWS)):
                 rows = narrow[start : start + BLOCK_ROWS].copy()
-                wide[start : start + BLOCK_ROWS, :before] = rows
-                wide[start : start + BLOCK_ROWS, before:] = none
+                wide[start : start + BLOCK_ROWS, :old_count] = rows
+                wide[start : start + BLOCK_ROWS, old_count:] = empty
 
     def write(self, rows: slice | NDArray[np.intp], answers: Results | Solutions) -> None:
-        """Some rows, which may have more columns than there are."""
+        """Write some rows, which may need more columns."""
         within = answers.within if isinstance(answers, Results) else answers.within_limits
         B = answers.q.shape[-2]
         self.widen(B)
@@ -78,7 +78,7 @@ class Results:
         self.status[rows], self.free[rows], self.complete[rows] = answers.status, answers.free, answers.complete
 
     def narrow(self) -> None:
-        """Leave columns away that no target needs; a copy."""
+        """Copy the arrays without columns that no target needs."""
         B = int(self.valid.sum(axis=1).max(initial=0))
         self.q, self.valid = self.q[:, :B].copy(), self.valid[:, :B].copy()
         self.within, self.branch = self.within[:, :B].copy(), self.branch[:, :B].copy()

@@ -1,4 +1,4 @@
-"""The C file that `armkin.compile` builds: an arm's formulas, and the loop over a batch."""
+"""The C file of `armkin.compile`: the formulas of an arm, and the loop over a batch."""
 
 from __future__ import annotations
 
@@ -49,16 +49,16 @@ if TYPE_CHECKING:
 PARTS = Path(__file__).parent / "parts"
 
 
-LANES = 16  # poses at once: vectors of any length, and blocks of some kilobytes
-POSES = 8  # poses at once of an elimination: a multiple of its vectors' lanes
+LANES = 16  # poses computed together, for vectors of any length and blocks of a few kilobytes
+POSES = 8  # poses of an elimination computed together, a multiple of the lanes of its vectors
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_equal_roots", "lanes_pass")
 
 
 class Library(NamedTuple):
-    """A C file to be built.
+    """A C file to be compiled.
 
-    content: its sha256, which it holds as `arm_content`. branches: 0 if it has no `arm_batch`. level: of
-    optimisation: 3 makes vectors of a formula's lanes; an elimination gains nothing from it and takes seconds.
+    content: its sha256, also in the file as `arm_content`. branches: 0 if it has no `arm_batch`. level: of
+    optimisation; 3 vectorises formulas, but for an elimination it brings nothing and takes seconds.
     """
 
     text: str
@@ -68,9 +68,9 @@ class Library(NamedTuple):
 
 
 def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
-    """The C file of an arm: fk alone without a task, or if the class has no form in C.
+    """The C file of an arm; only fk without a task, or if the class has no form in C.
 
-    commanded: the arm; arm: the same in actual joint values, `armkin.model.arm.actual_arm`, of which the branches are.
+    commanded: the arm; arm: the same in actual joint values (`armkin.model.arm.actual_arm`), as branches have them.
     """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and c_program.has_form(geometry):
@@ -92,9 +92,10 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         assert task is not None
         accepted = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
-            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(POSES)  # the elimination has met its own
+            # the elimination has its own threshold
+            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(POSES)
         fields |= _task_fields(arm, task, branches, accepted)
-        # branches that come in no order are numbered by their places, until `follow` sees a path
+        # unordered branches are numbered by their columns until `follow_branches` sorts them along a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
         jacobian, folds = _fold_code(arm, task, geometry, branches, fields)
@@ -109,7 +110,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
 def _fold_code(
     arm: Arm, task: Task, geometry: Geometry | None, branches: int, fields: dict[str, str]
 ) -> tuple[list[str], str]:
-    """How targets on an edge are told, and in front of it the Jacobian where C tells them."""
+    """The Jacobian, if C judges targets on an edge, and the code that judges them or leaves them to Python."""
     if geometry is None or not _can_judge_folds(arm, task, geometry) or branches > LANES:
         return [], _part_text("no_folds")
     text = _part_text("folds")
@@ -119,15 +120,15 @@ def _fold_code(
 
 
 def has_rows(task: Task, geometry: Geometry | None) -> bool:
-    """Whether the file has `arm_rows`: an elimination of the targets as they are given."""
+    """Whether the file has `arm_rows`, an elimination of targets as they are given."""
     return geometry is not None and geometry.pairs is None and task.orientation == "full"
 
 
 def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:
-    """What the parts of `ik` are filled in with."""
-    most = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
+    """Values of the fields in the parts of `ik`."""
+    bounds = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
     if task.orientation == "axis":
-        most += [number_text(2.0)] * 3
+        bounds += [number_text(2.0)] * 3
     return {
         "branches": str(branches),
         "target": str(c_program.target_size(task)),
@@ -142,21 +143,21 @@ def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[s
         "position": str(task.position),
         "first": str(9 if task.orientation == "full" else 0),
         "farthest": number_text(_farthest_coordinate(arm)),
-        "most": ", ".join(most),
+        "most": ", ".join(bounds),
         "axis": str(int(task.orientation == "axis")),
     }
 
 
 def _can_judge_folds(arm: Arm, task: Task, geometry: Geometry) -> bool:
-    """Whether parts/folds.c can tell what branches on an edge are: of closed forms that list all of them, as many
-    numbers as joints."""
+    """Whether parts/folds.c can judge branches on an edge: for closed forms that list all branches, and tasks with as
+    many numbers as joints."""
     rows = 6 if task.orientation == "full" else task.position + len(task.sums)
-    plain = task.orientation != "axis" and rows == arm.n > 1
-    return plain and geometry.pairs is not None and not geometry.ends and geometry.doubts is None
+    is_square = task.orientation != "axis" and rows == arm.n > 1
+    return is_square and geometry.pairs is not None and not geometry.ends and geometry.doubts is None
 
 
 def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
-    """What parts/folds.c is filled in with."""
+    """Values of the fields in parts/folds.c."""
     values = {
         "reach": arm.reach, "solution": SOLUTION, "closed": CLOSED, "folded": FOLDED, "lost": WEAK, "seed": SEED,
         "close_by": CLOSE_BY, "smooth": SMOOTH, "bent": BENT, "wide": REACH, "way": FOLD_WAY,
@@ -166,29 +167,29 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "nearer": local_structure.NEARER, "shorter": local_structure.SHORTER, "longest": local_structure.LONGEST,
         "gain": local_structure.BOTH_WAYS.gain,
     }  # fmt: skip
-    named = {name: number_text(value) for name, value in values.items()}
-    named["motions"] = str(int(not arm.keep_out))  # beside keep-outs a self-motion is listed by a free posture of it
-    named |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
-    named |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
-    named |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
+    fields = {name: number_text(value) for name, value in values.items()}
+    fields["motions"] = str(int(not arm.keep_out))  # with keep-outs, Python searches a self-motion for a free posture
+    fields |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
+    fields |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
+    fields |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
     tables = {"points": local_structure.POINTS, "last": local_structure.TO_LAST}
     sides = local_structure.BOTH_WAYS, local_structure.AHEAD
     tables |= {"nodes": np.stack([side.node for side in sides]), "fit": np.stack([side.to_powers for side in sides])}
-    named |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
-    named |= {
+    fields |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
+    fields |= {
         "nodes_count": str(local_structure.NODES),
         "links": str(chains.LINKS),
         "few_links": str(chains.FEW_LINKS),
         "along": str(self_motions.LINE_JOINTS),
     }
     sums = [[*row, offset] for row, offset in zip(task.sums.tolist(), task.offsets.tolist(), strict=True)]
-    named["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
-    named["sums"] = str(len(sums))
-    return named | {"unit": ", ".join(number_text(unit) for unit in radian_or_reach(arm).tolist())}
+    fields["weights"] = ", ".join("{" + ", ".join(map(number_text, row)) + "}" for row in sums)
+    fields["sums"] = str(len(sums))
+    return fields | {"unit": ", ".join(number_text(unit) for unit in radian_or_reach(arm).tolist())}
 
 
 def _farthest_coordinate(arm: Arm) -> float:
-    """How large a coordinate may be [mm]; with slides, so that the target is at most `FAR_DISTANCE` reaches away."""
+    """Greatest allowed coordinate [mm]; with slides, targets are at most `FAR_DISTANCE` reaches away."""
     if not arm.prismatic.any():
         return MAX_TARGET
     return max((FAR_DISTANCE * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
@@ -204,33 +205,33 @@ def _joint_loop(content: str, formula: str, size: int) -> str:
 
 
 def _fast_numbers() -> str:
-    """The numbers of double precision, with this file's own tan and atan2."""
+    """The settings of double precision, with faster tan and atan2."""
     numbers = part_text("numbers_double")
     return numbers.partition("#ifndef ARM_TAN")[0] + part_text("fast_numbers")
 
 
 def _choose_code(arm: Arm, branches: int) -> str:
-    """`arm_choose`: every joint at its nearest legal copy, and whether all joints of a branch are within limits."""
+    """`arm_choose`, which moves joints to their nearest legal copies and tells which branches are within limits."""
     loops = []
-    for j in range(arm.n):
-        lower, upper = (number_text(float(limit[j])) for limit in (arm.lower, arm.upper))
-        value = f"q[(b * {arm.n} + {j}) * ARM_LANES + i]"
-        close = f"near[{j} * ARM_LANES + i]"
-        if arm.prismatic[j]:
+    for joint in range(arm.n):
+        lower, upper = (number_text(float(limit[joint])) for limit in (arm.lower, arm.upper))
+        value = f"q[(b * {arm.n} + {joint}) * ARM_LANES + i]"
+        close = f"near[{joint} * ARM_LANES + i]"
+        if arm.prismatic[joint]:
             loops.append(
                 _in_every_lane(f"in[i] &= ({value} >= {lower} - ARM_SLACK) & ({value} <= {upper} + ARM_SLACK);")
             )
             continue
         copied = _in_every_lane(f"{value} = arm_copy({value}, {close}, {lower}, {upper}, &in[i]);")
-        if arm.lower[j] >= -math.pi and arm.upper[j] <= math.pi:
+        if arm.lower[joint] >= -math.pi and arm.upper[joint] <= math.pi:
             loops.append(copied)
             continue
-        # all that is within half a turn of `near` is legal, as a rule: the nearest copy is one
-        turned = _in_every_lane(f"{value} = arm_nearest({value}, {close});")
+        # usually all values within half a turn of `near` are legal, and so is the nearest copy
+        nearest = _in_every_lane(f"{value} = arm_nearest({value}, {close});")
         positive = _in_every_lane(f"{value} = arm_principal({value});")
-        wide = f"arm_wide(near + {j} * ARM_LANES, {lower}, {upper}, count)"
-        choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, turned, positive), strict=True)
-        loops.append(f"wide = {wide};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
+        range_test = f"arm_wide(near + {joint} * ARM_LANES, {lower}, {upper}, count)"
+        choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, nearest, positive), strict=True)
+        loops.append(f"wide = {range_test};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
     return f"""{_part_text("half_turn_in_limits")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,

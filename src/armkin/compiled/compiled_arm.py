@@ -1,4 +1,4 @@
-"""`armkin.compile`: the same kinematics from machine code."""
+"""`armkin.compile`: the kinematics of an arm by machine code."""
 
 from __future__ import annotations
 
@@ -39,8 +39,8 @@ if TYPE_CHECKING:
     from armkin.keep_out.clearance import Clearance
     from armkin.model.arm import Arm
 
-BLOCK_POSES = 16384  # poses of an elimination whose results are kept in all columns
-UNREAD = 2  # state of a target that must be read (made a rotation, refused) first: parts/batch.c
+BLOCK_POSES = 16384  # poses of an elimination that are solved together before empty columns are dropped
+UNREAD = 2  # state in parts/batch.c of a target that Python must first read, that is normalise or refuse
 
 
 def compile(arm: Arm, task: str | None = None) -> CompiledArm:  # noqa: A001 - `armkin.compile`
@@ -154,7 +154,7 @@ class CompiledArm:
         return (self._tasks.get(task) or self._library_for(task)).ik(targets, near, workers, rounding)
 
     def _any_library(self) -> _CompiledTask:
-        """A library: each has the chain, whatever its task."""
+        """Any library, as all contain the chain."""
         return next(iter(self._tasks.values()))
 
     def _library_for(self, task: str | None) -> _CompiledTask:
@@ -165,17 +165,17 @@ class CompiledArm:
                 library = self._tasks.get(task)
                 if library is None:
                     name = task or self.arm.task or default_task(self.arm)
-                    same = (built for built in self._tasks.values() if built.branches and built.task.name == name)
-                    library = self._tasks[task] = next(same, None) or _CompiledTask(self.arm, task)
+                    candidates = (built for built in self._tasks.values() if built.branches and built.task.name == name)
+                    library = self._tasks[task] = next(candidates, None) or _CompiledTask(self.arm, task)
         return library
 
 
 class _CompiledTask:
-    """One arm and task: the library, and the way from arrays to it and back."""
+    """The library of one arm and task, and its calls with arrays."""
 
     def __init__(self, arm: Arm, task: str | None) -> None:
         self.arm, self.name, self.n = arm, task, arm.n
-        self.turned = actual_arm(arm)  # formulas are those of actual joint values
+        self.turned = actual_arm(arm)  # formulas use actual joint values
         solved_task, form = _class_of(self.turned, task)
         if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
             form = c_program.plain_form(self.turned, solved_task, form) if form.places is not None else form
@@ -201,12 +201,12 @@ class _CompiledTask:
     def ik(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None = None
     ) -> Solutions:
-        """All branches of targets in the task's shape; said: how far the caller says that they are rounded."""
+        """All branches of targets in the task's shape; stated: rounding of the targets as stated by the caller."""
         if not self.branches:
             return self._solve_without_form(targets, near, stated)
-        alone = self._single is not None and stated is None
+        is_single = self._single is not None and stated is None
         if (
-            alone
+            is_single
             and type(targets) is np.ndarray
             and targets.shape == self.goal_shape
             and (solutions := self._solve_alone(targets, near)) is not None
@@ -219,40 +219,41 @@ class _CompiledTask:
     def _solve_batch(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
     ) -> Solutions:
-        """Solutions of `ik` for an arm whose joints move as they are commanded."""
+        """Solutions of `ik` for an arm with ratios of 1."""
         array = arrays.real_array(targets, "targets")
-        m = len(self.goal_shape)
-        if array.shape[-m:] != self.goal_shape or array.ndim < m:
-            return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)  # says what is wrong
-        lead = array.shape[: array.ndim - m]
-        close = self.arm.home if near is None else arrays.real_array(near, "near")
-        if close.shape not in ((self.n,), (*lead, self.n)) or not np.isfinite(close).all():
+        target_axes = len(self.goal_shape)
+        if array.shape[-target_axes:] != self.goal_shape or array.ndim < target_axes:
+            # raises the error about the shape
+            return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
+        lead = array.shape[: array.ndim - target_axes]
+        near_array = self.arm.home if near is None else arrays.real_array(near, "near")
+        if near_array.shape not in ((self.n,), (*lead, self.n)) or not np.isfinite(near_array).all():
             return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
         target = np.ascontiguousarray(array.reshape(-1, *self.goal_shape))
-        near_rows, rounding = np.ascontiguousarray(close), np.zeros(len(target))
-        solved = self._solve_rows if self.geometry.pairs is not None else self._solve_blocks
-        batch = solved(target, near_rows, workers, read=False)
+        near_rows, rounding = np.ascontiguousarray(near_array), np.zeros(len(target))
+        solve_all = self._solve_rows if self.geometry.pairs is not None else self._solve_blocks
+        batch = solve_all(target, near_rows, workers, read=False)
         if batch is None:
-            values, _, rounding = read_targets(self.task, target)  # refuses what is no target
+            values, _, rounding = read_targets(self.task, target)  # raises UsageError for invalid targets
             target = np.ascontiguousarray(values)
-            batch = solved(target, near_rows, workers, read=True)
+            batch = solve_all(target, near_rows, workers, read=True)
             assert batch is not None
         single = arrays.is_single(targets)
         shown = array.reshape(target.shape), rounding
-        rounding, most = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
-        rows = near_itself.solved_by_near(self.arm, self.task, target, near_rows, most)
+        rounding, least = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
+        rows = near_itself.solved_by_near(self.arm, self.task, target, near_rows, least)
         if len(rows):
-            self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), most - SOLUTION)
+            self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), least - SOLUTION)
         self._finish(batch, target)
-        target = target.copy() if np.may_share_memory(target, array) else target  # the caller's arrays may change
-        close = close.copy()
+        target = target.copy() if np.may_share_memory(target, array) else target  # the caller may change its arrays
+        near_array = near_array.copy()
         q = batch.q
         B = q.shape[1]
         return Solutions(
             arm=self.arm,
             task=self.task,
             target=target.reshape(array.shape),
-            near=close if close.shape == (*lead, self.n) else np.broadcast_to(close, (*lead, self.n)),
+            near=near_array if near_array.shape == (*lead, self.n) else np.broadcast_to(near_array, (*lead, self.n)),
             q=q.reshape(*lead, B, self.n),
             valid=batch.valid.reshape(*lead, B),
             within_limits=batch.within.reshape(*lead, B),
@@ -267,26 +268,26 @@ class _CompiledTask:
         )
 
     def _finish(self, batch: Results, target: Array) -> None:
-        """What is known of far targets, and numbers of branches that have no order of their own."""
+        """Mark far targets as incomplete, and number branches of classes without an order."""
         if self.arm.prismatic.any():
             batch.complete[distance(self.arm, self.task, target) > FAR_DISTANCE] = False
         if not self.geometry.ordered:
             batch.branch[...] = follow_branches(self.arm, self.task, batch.q, target)
 
     def _solve_without_form(self, targets: ArrayLike, near: ArrayLike | None, stated: ArrayLike | None) -> Solutions:
-        """Solutions of `armkin.ik`; where a joint is redundant, machine code solves for the others."""
-        if (spare := redundancy(self.arm, self.name)) is not None:
-            return families(_solve_others, self.arm, spare, targets, near, stated)
+        """Solutions of `armkin.ik`; for a redundant joint, machine code solves for the others."""
+        if (redundant := redundancy(self.arm, self.name)) is not None:
+            return families(_solve_others, self.arm, redundant, targets, near, stated)
         return solve.ik(self.arm, targets, self.name, near=near, rounding=stated)
 
     def _single_solver(self, call: Any) -> Single | None:
-        """The short way of one target, for arms whose branches and joint values need no more than C gives."""
+        """The fast solver of one target, for arms whose results C gives completely; else None."""
         if self.turned is not self.arm or self.geometry.places is not None:
             return None
         names = None if self.geometry.pairs is not None else self._branch_names
-        same = {"arm": self.arm, "task": self.task, "names": self.names, "complete": self.geometry.complete}
-        same |= {"method": self.geometry.name, "why": self.geometry.why}
-        return Single(call, self.goal_shape, self.arm.home, self.branches, same, names)
+        shared_fields = {"arm": self.arm, "task": self.task, "names": self.names, "complete": self.geometry.complete}
+        shared_fields |= {"method": self.geometry.name, "why": self.geometry.why}
+        return Single(call, self.goal_shape, self.arm.home, self.branches, shared_fields, names)
 
     def _branch_names(self, count: int) -> tuple[str, ...]:
         if self.geometry.pairs is None:
@@ -294,39 +295,39 @@ class _CompiledTask:
         return self.names + tuple(f"branch {i + 1}" for i in range(self.branches, count))
 
     def _solve_alone(self, target: Array, near: ArrayLike | None) -> Solutions | None:
-        """One target the short way; None if there is more to it."""
+        """Solutions of one target by the fast solver; None if it cannot solve the target."""
         assert self._single is not None
         if target.dtype != np.float64:
             return None
         if near is None:
             return self._single.solve(target, None)
-        close = np.asarray(near)
-        if close.shape != (self.n,) or close.dtype.kind not in "if":
+        near_array = np.asarray(near)
+        if near_array.shape != (self.n,) or near_array.dtype.kind not in "if":
             return None
-        return self._single.solve(target, close.astype(np.float64))
+        return self._single.solve(target, near_array.astype(np.float64))
 
     def _solve_rows(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
-        """All branches of targets (N, ...); None if some must be read first. near: (n,) or (N, n)."""
+        """All branches of targets (N, ...); None if Python must first read some. near: (n,) or (N, n)."""
         batch = Results(len(target), self.branches, self.n)
         step = self.n if near.size != self.n or len(target) == 1 else 0
         near_rows = near.reshape(-1, self.n)
 
         def solve_part(rows: slice) -> int:
-            arrays_ = (batch.q, batch.valid, batch.within, batch.branch, batch.status, batch.free, batch.state)
-            pointers = (a[rows].ctypes.data for a in arrays_)
-            close = near_rows[rows] if step else near_rows
+            outputs = (batch.q, batch.valid, batch.within, batch.branch, batch.status, batch.free, batch.state)
+            pointers = (a[rows].ctypes.data for a in outputs)
+            near_part = near_rows[rows] if step else near_rows
             count = rows.stop - rows.start
-            return int(self._batch(count, target[rows].ctypes.data, close.ctypes.data, step, read, *pointers))
+            return int(self._batch(count, target[rows].ctypes.data, near_part.ctypes.data, step, read, *pointers))
 
-        least = THREAD_POSES if self.geometry.pairs is not None else THREAD_POSES // 64
-        left = sum(share_rows(solve_part, len(target), workers, least))
-        if left and not read and (batch.state == UNREAD).any():
+        thread_rows = THREAD_POSES if self.geometry.pairs is not None else THREAD_POSES // 64
+        open_count = sum(share_rows(solve_part, len(target), workers, thread_rows))
+        if open_count and not read and (batch.state == UNREAD).any():
             return None
         batch.complete[...] = self.geometry.complete
         if self.geometry.places is not None:
             self._place_branches(batch, target)
-        if left:
-            # All targets have been read, so each state is 0 or 1, and flags are read faster than numbers.
+        if open_count:
+            # after reading, each state is 0 or 1, and flags are faster than numbers
             rows = np.flatnonzero(batch.state.view(np.bool_))
             self._solve_by_python(batch, rows, target, near_rows)
         return batch
@@ -334,7 +335,7 @@ class _CompiledTask:
     def _solve_by_python(
         self, batch: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
     ) -> None:
-        """Write the answers of some targets, all of which have been read; near: (1, n) or (N, n)."""
+        """Solve some targets in Python and write their results; near: (1, n) or (N, n)."""
         sure = np.zeros(len(rows), bool) if self._in_c is None else self._in_c.settles(target[rows])
         for part, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
             if len(part) and geometry:
@@ -342,24 +343,24 @@ class _CompiledTask:
                 batch.write(part, solve.solve_by(self.arm, self.task, geometry, target[part], close, rounding=of_rows))
 
     def _place_branches(self, batch: Results, target: Array) -> None:
-        """Branches that C has found in the order and with the indices of the class that they are named after."""
+        """Sort and number branches from C as the class that names them does."""
         assert self.geometry.places is not None
         solved = np.flatnonzero(batch.state == 0)
-        wide = int(batch.valid[solved].sum(axis=1).max(initial=0))  # branches stand in the first columns
-        q, valid, within = batch.q[solved, :wide], batch.valid[solved, :wide], batch.within[solved, :wide]
+        width = int(batch.valid[solved].sum(axis=1).max(initial=0))  # branches are in the first columns
+        q, valid, within = batch.q[solved, :width], batch.valid[solved, :width], batch.within[solved, :width]
         branch = self.geometry.places(q, target[solved])
         order = np.argsort(np.where(valid, branch, np.iinfo(np.int8).max), axis=1, kind="stable")
-        batch.q[solved, :wide] = np.take_along_axis(q, order[:, :, None], axis=1)
+        batch.q[solved, :width] = np.take_along_axis(q, order[:, :, None], axis=1)
         for values, found_values in ((batch.within, within), (batch.branch, branch)):
-            values[solved, :wide] = np.take_along_axis(found_values, order, axis=1)
+            values[solved, :width] = np.take_along_axis(found_values, order, axis=1)
 
     def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
-        """Results of `_solve_rows` for an elimination, block by block, in no more columns than the batch needs."""
+        """Results of `_solve_rows` for an elimination, in blocks without unused columns."""
         batch = Results(len(target), 0, self.n)
         for start in range(0, max(len(target), 1), BLOCK_POSES):
             rows = slice(start, min(start + BLOCK_POSES, len(target)))
-            close = near if near.size == self.n else near.reshape(-1, self.n)[rows]
-            block = self._solve_rows(target[rows], close, workers, read=read)
+            near_part = near if near.size == self.n else near.reshape(-1, self.n)[rows]
+            block = self._solve_rows(target[rows], near_part, workers, read=read)
             if block is None:
                 return None
             block.narrow()
@@ -371,20 +372,20 @@ class _CompiledTask:
     def _solve_commanded(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
     ) -> Solutions:
-        """A calibrated arm, by way of its actual joint values."""
+        """Solutions for a calibrated arm, computed in actual joint values."""
         inner = compile(self.turned, self.name)
         close = solve._actual_near(self.arm, near)
         return solve._as_commanded(self.arm, inner.ik(targets, self.name, close, workers=workers, rounding=stated))
 
 
 def _solve_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
-    """`armkin.ik` of an arm whose redundant joint is held, from machine code."""
+    """`armkin.ik` by machine code for an arm with its redundant joint held."""
     return compile(arm, task).ik(targets, task, **options)
 
 
 def _class_of(arm: Arm, name: str | None) -> tuple[Task | None, Geometry | None]:
-    """The task and the solver of an arm; none of both for one whose usual task does not fit it, which still has poses,
-    and for one with a redundant joint."""
+    """The task and the solver of an arm; None for an arm with a redundant joint, or whose usual task does not fit it,
+    as the arm then still has poses."""
     if redundancy(arm, name) is not None:
         return None, None
     try:

@@ -1,6 +1,6 @@
-"""Rows of an elimination from machine code, for the targets on an edge that Python examines.
+"""Rows of an elimination by machine code, for targets on an edge that Python examines.
 
-Examining asks the elimination of these targets and of those around them: in C it takes a hundredth of the time.
+Examining a target solves it and many targets around it, which takes a hundredth of the time in C.
 """
 
 from __future__ import annotations
@@ -19,27 +19,27 @@ from armkin.inverse.solvers.nearly_special import name_branches
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
 
-SETTLED = 2  # what `arm_rows` says is less where a target's branches are all, and isolated: export/c/parts/candidates.c
+SETTLED = 2  # states of `arm_rows` below this mean complete, isolated branches; see export/c/parts/candidates.c
 
 
 class InC:
-    """A class whose rows come from `arm_rows` of parts/elimination_rows.c; what that does not settle, from Python."""
+    """A class whose rows come from `arm_rows` of parts/elimination_rows.c, and unsettled ones from Python."""
 
     def __init__(
         self, geometry: Geometry, unnamed: Geometry, call: Callable[..., Any], branches: int, joints: int
     ) -> None:
-        """unnamed: the elimination without names; branches, joints: those that a row of C has room for."""
+        """unnamed: the elimination without names; branches, joints: the size of a row in C."""
         self._complete, self._slow = unnamed.complete, geometry.unmoved or unnamed.rows
         self._call, self._shape = call, (branches, joints)
         rows = name_branches(self._rows, geometry) if geometry.places else self._rows
         self.geometry = replace(geometry, rows=rows, unmoved=None)
 
     def settles(self, target: Array) -> Bool:
-        """Which targets (N, 4, 4) have all their branches in C, each an isolated one: (N,)."""
+        """Which targets (N, 4, 4) have complete and isolated branches in C: (N,)."""
         return np.asarray(self._call_c(target)[1] < SETTLED)
 
     def _call_c(self, target: Array) -> tuple[Array, NDArray[np.uint8]]:
-        """Branches (N, B, n) of targets, nan behind the last, and what C says of each (N,)."""
+        """Branches (N, B, n) of targets, nan after the last, and the states (N,) of the targets."""
         goal = np.ascontiguousarray(target)
         q, states = np.empty((len(goal), *self._shape)), np.empty(len(goal), np.uint8)
         self._call(len(goal), goal.ctypes.data, q.ctypes.data, states.ctypes.data)
@@ -50,14 +50,14 @@ class InC:
         q, states = self._call_c(target)
         doubt, lost, complete = states > 0, np.zeros(N, bool), np.full(N, self._complete)
         guesses = np.empty((N, 0, n))
-        if len(left := np.flatnonzero(states >= SETTLED)):
+        if len(unsettled := np.flatnonzero(states >= SETTLED)):
             assert self._slow is not None
-            slow_rows = self._slow(target[left])
+            slow_rows = self._slow(target[unsettled])
             assert slow_rows.lost is not None
             assert slow_rows.guesses is not None
             guesses = np.full((N, slow_rows.guesses.shape[1], n), np.nan)
-            q[left] = np.nan
-            q[left, : slow_rows.q.shape[1]], guesses[left] = slow_rows.q, slow_rows.guesses
-            doubt[left], lost[left], complete[left] = slow_rows.doubt, slow_rows.lost, slow_rows.complete
-        most = int((~np.isnan(q[:, :, 0])).sum(axis=1).max(initial=0))
-        return Rows(q[:, :most], doubt, complete, lost, guesses)
+            q[unsettled] = np.nan
+            q[unsettled, : slow_rows.q.shape[1]], guesses[unsettled] = slow_rows.q, slow_rows.guesses
+            doubt[unsettled], lost[unsettled], complete[unsettled] = slow_rows.doubt, slow_rows.lost, slow_rows.complete
+        width = int((~np.isnan(q[:, :, 0])).sum(axis=1).max(initial=0))
+        return Rows(q[:, :width], doubt, complete, lost, guesses)

@@ -1,4 +1,4 @@
-"""What a compiled arm says of joint values: poses, positions and clearances, at any angle."""
+"""Functions of joint values in machine code: poses, positions and clearances."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from armkin.keep_out.clearance import Clearance, clearance, least_clearances, na
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-THREAD_POSES = 8192  # poses of a closed form from which on a thread pays
+THREAD_POSES = 8192  # poses of a closed form from which on another thread is worth starting
 
 
 class JointFunctions:
-    """Functions of joint values (..., n) [rad | mm] in an arm's library, whatever its task."""
+    """Functions of joint values (..., n) [rad | mm] in the library of an arm."""
 
     def __init__(self, arm: Arm, code: ctypes.CDLL) -> None:
         self.arm = arm
@@ -39,7 +39,7 @@ class JointFunctions:
         return self._run(self._points, forward.position, (3,), q, workers)
 
     def clearance(self, q: ArrayLike) -> Clearance:
-        """Least clearances and their pairs; in Python where C has no table of them, or leaves an angle."""
+        """Least clearances and their pairs; in Python without a table in C, or for values that are not finite."""
         values = forward.as_joints(self.arm, q)
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
@@ -49,16 +49,16 @@ class JointFunctions:
     def _run(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int
     ) -> Array:
-        """A function of joint values: in C, and in Python for angles that C leaves."""
+        """A function of joint values in C, and in Python for the large angles that C refuses."""
         values = forward.as_joints(self.arm, q)
-        flat = np.ascontiguousarray(values.reshape(-1, self.arm.n))
-        results, wild = np.empty((len(flat), *shape)), np.empty(len(flat), np.uint8)
+        rows_of_q = np.ascontiguousarray(values.reshape(-1, self.arm.n))
+        results, is_refused = np.empty((len(rows_of_q), *shape)), np.empty(len(rows_of_q), np.uint8)
 
         def run_part(rows: slice) -> int:
-            pointers = (a[rows].ctypes.data for a in (flat, results, wild))
+            pointers = (a[rows].ctypes.data for a in (rows_of_q, results, is_refused))
             return int(call(rows.stop - rows.start, *pointers))
 
-        if sum(share_rows(run_part, len(flat), workers, THREAD_POSES)):
-            far = np.flatnonzero(wild)
-            results[far] = python(self.arm, flat[far])
+        if sum(share_rows(run_part, len(rows_of_q), workers, THREAD_POSES)):
+            refused = np.flatnonzero(is_refused)
+            results[refused] = python(self.arm, rows_of_q[refused])
         return results.reshape(*values.shape[:-1], *shape)

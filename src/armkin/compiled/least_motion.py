@@ -1,4 +1,4 @@
-"""The branch that moves the joints least by machine code: as `ik_columns.nearest_branches`, to the same bits."""
+"""`ik_columns.nearest_branches`, the branch that moves the joints least, by machine code with identical results."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric.tolerances import EQUAL
 
 SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
-MAX_JOINTS = 7  # joints, at most, that numpy adds up from left to right
+MAX_JOINTS = 7  # most joints that numpy sums from left to right
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array] | None:
-    """See `armkin.columns.ik_columns.nearest_branches`; None for more joints than are added up one after the other."""
+    """See `armkin.columns.ik_columns.nearest_branches`; None for more than `MAX_JOINTS` joints."""
     N, B, n = q.shape
     if n > MAX_JOINTS:
         return None
-    branch, motion, away = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
-    inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), away
+    branch, motion, differences = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
+    inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), differences
     pointers = (array.ctypes.data for array in inputs)
     _library()(N, B, n, *pointers, 10.0**EQUAL, branch.ctypes.data, motion.ctypes.data)
     return branch, motion

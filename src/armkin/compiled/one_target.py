@@ -1,4 +1,4 @@
-"""One target at a time: a block of memory that C reads and writes, so that a call costs microseconds."""
+"""Solves one target in microseconds, through a block of memory that C reads and writes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
 
-LEFT = 4  # what `arm_single` returns for a target that it leaves to Python
+LEFT = 4  # state that `arm_single` returns for a target that Python has to solve
 _BOOL, _INT8 = np.dtype(np.bool_), np.dtype(np.int8)
 
 
 def _read_only(value: object) -> NDArray[Any]:
-    """An array () that solutions share, and so nobody may change."""
+    """A read-only array () that solutions share."""
     array = np.array(value)
     array.flags.writeable = False
     return array
@@ -30,7 +30,7 @@ _STATUS = tuple(_read_only(np.int8(status)) for status in sorted(Status))
 
 
 class Single:
-    """`arm_single` of parts/batch.c for one arm and task; every thread has a block of its own."""
+    """`arm_single` of parts/batch.c for one arm and task, with a block for each thread."""
 
     def __init__(
         self,
@@ -41,9 +41,9 @@ class Single:
         shared_fields: dict[str, Any],
         names: Callable[[int], tuple[str, ...]] | None,
     ) -> None:
-        """call: takes a block's address; shape: of a target; shared_fields: fields that all solutions share.
+        """call: takes the address of a block; shape: of a target; shared_fields: fields that all solutions share.
 
-        names: of that many branches, for classes that list no more rows than a target has branches; else None.
+        names: names of a number of branches, for classes that list only the branches of a target; else None.
         """
         self._call, self._shape = call, shape
         self._home, self._names = home, names
@@ -60,7 +60,7 @@ class Single:
         self._size = size + n + B * n + (3 * B + n + 2 + 7) // 8
 
     def _block(self) -> list[Any]:
-        """Target, near, results, the block's address, and the array that near was copied from."""
+        """Target, near, results, the address of the block, and the array from which near was copied."""
         block = np.zeros(self._size)
         size = self._results - self._n
         target, near, results = np.split(block, [size, self._results])
@@ -69,10 +69,7 @@ class Single:
         return parts
 
     def _split_block(self, rows: int) -> tuple[Any, ...]:
-        """Where q, valid, within, branch and free of `rows` branches stand, and the fields that do not differ.
-
-        q's shape follows its place.
-        """
+        """Slices of q, valid, within, branch and free for `rows` branches, with the shape of q, and shared fields."""
         n, B, first = self._n, self._branches, self._bytes
         masks = [slice(start, start + rows) for start in (first, first + B, first + 2 * B)]
         same = self._shared_fields if self._names is None else {**self._shared_fields, "names": self._names(rows)}
@@ -80,17 +77,17 @@ class Single:
         return self._cuts[rows]
 
     def solve(self, target: Array, near: Array | None) -> Solutions | None:
-        """The branches of a target of float64 in the task's shape; None if C leaves it open. near: (n,) or None."""
+        """The branches of a float64 target in the task's shape; None if C cannot solve it. near: (n,) or None."""
         try:
             block = self._local.block
         except AttributeError:
             block = self._block()
-        target_in, near_in, results, address, before = block
-        close = self._home if near is None else near
+        target_in, near_in, results, address, copied_near = block
+        near_values = self._home if near is None else near
         target_in[...] = target
-        if close is not before:
-            near_in[...] = close
-            block[4] = self._home if near is None else None  # home does not change, other arrays may
+        if near_values is not copied_near:
+            near_in[...] = near_values
+            block[4] = self._home if near is None else None  # home never changes, while other arrays may
         state = self._call(address)
         if state == LEFT:
             return None
@@ -98,12 +95,12 @@ class Single:
         flags, rows = values.view(_BOOL), self._branches
         if self._names is not None:
             rows = int(flags[self._bytes : self._bytes + rows].sum())
-        q, shape, valid, within, branch, free, same = self._cuts.get(rows) or self._split_block(rows)
-        solutions = Solutions.__new__(Solutions)  # a frozen class sets its fields one by one, for two microseconds
+        q, shape, valid, within, branch, free, shared_fields = self._cuts.get(rows) or self._split_block(rows)
+        solutions = Solutions.__new__(Solutions)  # the constructor of a frozen class would take two microseconds
         solutions.__dict__.update(
-            same,
-            target=target.copy(),  # the caller's array may change
-            near=close,
+            shared_fields,
+            target=target.copy(),  # the caller may change its array
+            near=near_values,
             q=values[q].reshape(shape),
             valid=flags[valid],
             within_limits=flags[within],

@@ -1,4 +1,4 @@
-"""Columns as lines of text by machine code: the bytes of `armkin.columns.csv_and_json_lines`, several times as fast."""
+"""Columns as lines of text by machine code: the bytes of `armkin.columns.csv_and_json_lines`, but faster."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from armkin.columns.table import Column, Table, Words, row_count, take_rows
 from armkin.compiled import toolchain
 
 SOURCE = Path(__file__).parent / "parts" / "table_lines.c"
-MIN_EXP, MAX_EXP = -292, 324  # powers of ten, least and greatest, that doubles need
-MAX_WIDTH = 25  # characters of a number: -2.2250738585072014e-308
-SPARE_CHARACTERS = 64  # characters behind the last one that C may write
-BLOCK_ROWS = 4_096  # rows printed at once: their text stays in the cache
+MIN_EXP, MAX_EXP = -292, 324  # least and greatest power of ten that doubles need
+MAX_WIDTH = 25  # most characters of a number, such as -2.2250738585072014e-308
+SPARE_CHARACTERS = 64  # characters that C may write after the last one
+BLOCK_ROWS = 4_096  # rows printed together, so that their text fits the cache
 
 
 def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
@@ -27,11 +27,11 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
     print_rows = _library()
     texts = [_column_words(column, quoted) for column in table.values()]
     cells = [[before, missing, *cell] for before, cell in zip(between, texts, strict=False)] + [[between[-1]]]
-    flat = [text.encode() for parts in cells for text in parts]
-    ends = np.cumsum([0, *map(len, flat)], dtype=np.int64)
-    first = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
-    width = sum(map(len, between)) + len(table) * max(MAX_WIDTH, *map(len, flat))
-    words, buffer = b"".join(flat), np.empty(min(count, BLOCK_ROWS) * width + SPARE_CHARACTERS, np.uint8)
+    encoded = [text.encode() for parts in cells for text in parts]
+    ends = np.cumsum([0, *map(len, encoded)], dtype=np.int64)
+    cell_starts = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
+    width = sum(map(len, between)) + len(table) * max(MAX_WIDTH, *map(len, encoded))
+    words, buffer = b"".join(encoded), np.empty(min(count, BLOCK_ROWS) * width + SPARE_CHARACTERS, np.uint8)
     printed = []
     for start in range(0, count, BLOCK_ROWS):
         block = take_rows(table, slice(start, start + BLOCK_ROWS))
@@ -43,7 +43,7 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
             (ctypes.c_void_p * len(kinds))(*(parts.ctypes.data for parts in values)),
             words,
             ends.ctypes.data,
-            first.ctypes.data,
+            cell_starts.ctypes.data,
             buffer.ctypes.data,
         )
         printed.append(buffer[:size].tobytes())
@@ -58,7 +58,7 @@ def _column_words(column: Column, quoted: Callable[[Any], str]) -> list[str]:
 
 
 def _column_values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
-    """What kind of column it is, and its values as C takes them."""
+    """The kind of a column, and its values for C."""
     if isinstance(column, Words):
         return 3, np.ascontiguousarray(column.index, np.int64)
     if column.dtype == bool:
@@ -83,15 +83,15 @@ def _library() -> Any:
     return function
 
 
-def _power(k: int) -> tuple[int, int]:
-    """10^k as 128 bits with the highest one set, rounded up."""
-    top, bottom = (10**k, 1) if k >= 0 else (1, 10**-k)
+def _power(exponent: int) -> tuple[int, int]:
+    """10^k as 128 bits with the highest bit set, rounded up."""
+    top, bottom = (10**exponent, 1) if exponent >= 0 else (1, 10**-exponent)
     shift = 128 - (top.bit_length() - bottom.bit_length())
-    for more in (shift - 1, shift, shift + 1):  # the quotient has a bit more or less
-        value = -((-top << more) // bottom) if more >= 0 else -(-top // (bottom << -more))
+    for bits in (shift - 1, shift, shift + 1):  # the quotient may have one bit more or less
+        value = -((-top << bits) // bottom) if bits >= 0 else -(-top // (bottom << -bits))
         if value.bit_length() == 128:
             return value >> 64, value & (2**64 - 1)
-    raise AssertionError(k)
+    raise AssertionError(exponent)
 
 
 def _hex(value: int) -> str:

@@ -1,9 +1,9 @@
-"""The system's C compiler, and the folder of what it has built.
+"""The system's C compiler, and the cache of compiled libraries.
 
-What is built is kept in the user's cache folder, by content: the name is the sha256 of the source, the
-compiler, its flags and the processor, and that of the library itself, so that a torn file is never loaded. A
-library is loaded only from a folder and a file that belong to this user and that nobody else can write; where
-that folder cannot be had, every process builds its own.
+Libraries are kept in the user's cache folder. Their name contains the sha256 of the source, the compiler, its flags and
+the processor, and the sha256 of the library itself, so that an incomplete file is never loaded. A library is loaded
+only if its folder and file belong to this user and nobody else can write them; without such a folder, every process
+builds its own library.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from pathlib import Path
 from armkin import user_folders
 from armkin.errors import FileError, MissingExtraError
 
-# No fast-math: sums keep their order, infinities and what is not a number keep their meaning. That errno is not
-# set and no floating-point trap is awaited lets loops with square roots and comparisons become vectors.
+# no fast-math, so that sums keep their order, and infinities and nan their meaning; without errno and floating-point
+# traps, loops with square roots and comparisons can be vectorised
 FLAGS = ["-std=c99", "-march=native", "-fno-math-errno", "-fno-trapping-math", "-ffp-contract=off"]
 FLAGS += ["-shared", "-fPIC"]
 _DAY = 86_400.0  # day [s]
-MAX_SECONDS = 60.0  # time [s] that optimising may take; three_dof takes 2, an arm by elimination 8
+MAX_SECONDS = 60.0  # longest time [s] for optimising; three_dof takes 2, an arm by elimination 8
 
 
 def announce() -> None:
-    """A library is built now: the command line puts its own words here."""
+    """Called before a library is built; the command line replaces it to print a message."""
 
 
 def compiler_command() -> list[str]:
-    """The compiler's path, and its options: those of $CC, or the first of cc, gcc, clang.
+    """The path and options of the compiler: $CC, or the first of cc, gcc, clang.
 
     Raises MissingExtraError if there is none.
     """
@@ -55,28 +55,28 @@ def compiler_command() -> list[str]:
     )
 
 
-def _command_words(named: str) -> list[str]:
-    """$CC as make reads it, such as ``ccache gcc``; a path with spaces in it stays one word."""
-    if shutil.which(named) is not None:
-        return [named]
+def _command_words(command: str) -> list[str]:
+    """$CC split into words, such as ``ccache gcc``; a path with spaces stays one word."""
+    if shutil.which(command) is not None:
+        return [command]
     try:
-        return shlex.split(named) or [named]
-    except ValueError:  # a quote without its other half
-        return [named]
+        return shlex.split(command) or [command]
+    except ValueError:  # an unmatched quote
+        return [command]
 
 
 def load_library(source: str, content: str, level: int = 3) -> ctypes.CDLL:
-    """A C file as a loaded library: from the cache, or built now.
+    """The library of a C file, loaded from the cache or built.
 
-    content: what the library must hold as `arm_content`; level: of optimisation, or none where that takes the
-    compiler over MAX_SECONDS. Raises MissingExtraError without a compiler, or if it fails; FileError where there is
-    no place to build.
+    content: the expected `arm_content` of the library; level: of optimisation, replaced by 0 if the compiler takes more
+    than MAX_SECONDS. Raises MissingExtraError without a compiler, or if it fails; FileError without a folder for the
+    build.
     """
     folder, commands = _cache_folder(), {}
-    for way in dict.fromkeys((level, 0)):
-        command = [*compiler_command(), f"-O{way}", *FLAGS]
-        # a busy computer may have been too slow to optimise: one that did not is tried again the next day
-        day = [] if way == level else [str(int(time.time() // _DAY))]
+    for used_level in dict.fromkeys((level, 0)):
+        command = [*compiler_command(), f"-O{used_level}", *FLAGS]
+        # optimising may fail on a busy computer, so that it is tried again the next day
+        day = [] if used_level == level else [str(int(time.time() // _DAY))]
         key = "\0".join([source, *command, _compiler_version(command[0]), _processor_text(), *day])
         commands[name := hashlib.sha256(key.encode()).hexdigest()] = command
         if folder is not None and (library := _stored_library(folder, name, content)) is not None:
@@ -90,14 +90,14 @@ def load_library(source: str, content: str, level: int = 3) -> ctypes.CDLL:
                 if (library := _stored_library(folder, name, content)) is not None:
                     return library
             return ctypes.CDLL(str(built))
-    except OSError as error:  # a full disk, a folder from which nothing may be run
+    except OSError as error:  # a full disk, or a folder without execution rights
         raise FileError(
             f"no place to build the arm's code: {error}; TMPDIR may name a folder with room whose programs may run"
         ) from None
 
 
 def _build(commands: dict[str, list[str]], source: str, folder: Path) -> tuple[Path, str]:
-    """Compile in a folder of one's own, by the first command that ends in time; the library and that command's name."""
+    """Compile in a private folder by the first command that ends in time; the library and the name of the command."""
     (folder / "arm.c").write_text(source, encoding="utf-8")
     for name, command in commands.items():
         run = _run_compiler(
@@ -119,7 +119,7 @@ def _build(commands: dict[str, list[str]], source: str, folder: Path) -> tuple[P
 def _run_compiler(
     words: list[str], folder: Path | None = None, seconds: float | None = None
 ) -> subprocess.CompletedProcess[str] | None:
-    """Run the compiler; None if it does not end in time. Raises MissingExtraError if it is no program."""
+    """Run the compiler; None if it does not end in time. Raises MissingExtraError if it cannot be run."""
     try:
         return subprocess.run(
             words, cwd=folder, capture_output=True, text=True, errors="replace", check=False, timeout=seconds
@@ -131,15 +131,15 @@ def _run_compiler(
 
 
 def _store_library(built: Path, folder: Path, name: str) -> None:
-    """Put a library into the cache, whole; a full disk keeps nothing."""
-    held = built.read_bytes()
+    """Put a complete library into the cache; on a full disk nothing is stored."""
+    content = built.read_bytes()
     with suppress(OSError):
         handle, temporary = tempfile.mkstemp(prefix=".build-", dir=folder)
         try:
             with open(handle, "wb") as file:
-                file.write(held)
+                file.write(content)
             os.chmod(temporary, 0o700)
-            os.replace(temporary, folder / f"{name}-{_digest(held)}.so")
+            os.replace(temporary, folder / f"{name}-{_digest(content)}.so")
         except BaseException:
             os.unlink(temporary)
             raise
@@ -150,43 +150,43 @@ def _digest(content: bytes) -> str:
 
 
 def _cache_folder() -> Path | None:
-    """The cache folder, made if need be; None if it is not this user's alone."""
+    """The cache folder, made if missing; None if other users can write it."""
     folder = user_folders.compiled_folder()
     if folder is None:
         return None
     base = folder.parent.parent
     try:
         base.mkdir(mode=0o700, parents=True, exist_ok=True)
-        for path in (folder.parent, folder):  # one by one: `parents` would leave those above to the umask
+        for path in (folder.parent, folder):  # one by one, as `parents` ignores the mode for folders above
             path.mkdir(mode=0o700, exist_ok=True)
-        # who can write a folder above can put another in its place
+        # whoever can write a folder above could replace the cache folder
         are_ours = all(_is_ours(path, path == folder) for path in (folder, folder.parent, base))
-    except OSError:  # a file in the way, a full or read-only disk
+    except OSError:  # a file of that name, a full disk or a read-only one
         return None
     return folder if are_ours and os.access(folder, os.W_OK) else None
 
 
 def _is_ours(path: Path, only_user: bool = True) -> bool:
-    """Whether a file or folder is no link, belongs to this user (not `only_user`: or to root); no other can write."""
+    """Whether a path is no link and only this user can write it; without `only_user` it may belong to root."""
     status = os.lstat(path) if only_user else os.stat(path)
-    if sys.platform == "win32":  # a user's own folders are closed to others
+    if sys.platform == "win32":  # other users cannot write a user's own folders
         return not stat.S_ISLNK(status.st_mode)
     owner = status.st_uid == os.geteuid() or (not only_user and status.st_uid == 0)
     return owner and not stat.S_ISLNK(status.st_mode) and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
 def _stored_library(folder: Path, name: str, content: str) -> ctypes.CDLL | None:
-    """A library of the cache, if it may be loaded and is what it should be."""
+    """A library of the cache, if it is safe to load and has the expected content."""
     for library in folder.glob(f"{name}-*.so"):
         try:
-            # read before it is loaded: the loader of a torn file ends the process
+            # check the digest before loading, as loading an incomplete file ends the process
             if not _is_ours(library) or library.stem != f"{name}-{_digest(library.read_bytes())}":
                 continue
             loaded = ctypes.CDLL(str(library))
-            held = (ctypes.c_char * (len(content) + 1)).in_dll(loaded, "arm_content").value
+            stored_content = (ctypes.c_char * (len(content) + 1)).in_dll(loaded, "arm_content").value
         except (OSError, ValueError):
             continue
-        if held == content.encode():
+        if stored_content == content.encode():
             return loaded
     return None
 
@@ -199,7 +199,7 @@ def _compiler_version(path: str) -> str:
 
 @cache
 def _processor_text() -> str:
-    """What -march=native goes by: a home folder may be shared by unlike computers."""
+    """The processor, on which -march=native depends, as different computers may share a home folder."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()
     except OSError:
