@@ -36,16 +36,10 @@ def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], 
     for start in range(0, count, BLOCK_ROWS):
         block = take_rows(table, slice(start, start + BLOCK_ROWS))
         kinds, values = zip(*map(_column_values, block.values()), strict=True)
-        size = print_rows(
-            row_count(block),
-            len(kinds),
-            (ctypes.c_int * len(kinds))(*kinds),
-            (ctypes.c_void_p * len(kinds))(*(parts.ctypes.data for parts in values)),
-            words,
-            ends.ctypes.data,
-            cell_starts.ctypes.data,
-            buffer.ctypes.data,
-        )
+        kind_array = (ctypes.c_int * len(kinds))(*kinds)
+        value_pointers = (ctypes.c_void_p * len(kinds))(*(column.ctypes.data for column in values))
+        pointers = ends.ctypes.data, cell_starts.ctypes.data, buffer.ctypes.data
+        size = print_rows(row_count(block), len(kinds), kind_array, value_pointers, words, *pointers)
         printed.append(buffer[:size].tobytes())
     return b"".join(printed)
 

@@ -338,18 +338,23 @@ def _draw_arc(pen: _Outline, v: list[float]) -> None:
         return
     cos, sin = math.cos(turned), math.sin(turned)
     dx, dy = (x1 - x2) / 2, (y1 - y2) / 2
-    x, y = cos * dx + sin * dy, -sin * dx + cos * dy
+    x, y = cos * dx + sin * dy, -sin * dx + cos * dy  # half the chord, along the ellipse's axes
     scale = (x / rx) ** 2 + (y / ry) ** 2
-    if scale > 1:
+    if scale > 1:  # too small for its chord: grown until it fits
         rx, ry = rx * math.sqrt(scale), ry * math.sqrt(scale)
-    below = rx * rx * y * y + ry * ry * x * x
-    root = math.sqrt(max(rx * rx * ry * ry - below, 0.0) / below) * (-1 if large == sweep else 1)
-    cx, cy = root * rx * y / ry, -root * ry * x / rx
+    cx, cy = _ellipse_centre(x, y, rx, ry, -1 if large == sweep else 1)
     begin = math.atan2((y - cy) / ry, (x - cx) / rx)
     angle = (math.atan2((-y - cy) / ry, (-x - cx) / rx) - begin) % (2 * math.pi)
     angle = angle if sweep else angle - 2 * math.pi
     centre = cos * cx - sin * cy + (x1 + x2) / 2, sin * cx + cos * cy + (y1 + y2) / 2
     pen.ellipse(centre, rx, ry, turned, begin, angle)
+
+
+def _ellipse_centre(x: float, y: float, rx: float, ry: float, side: int) -> Point:
+    """The centre, seen from a chord's middle, of the ellipse through its ends (x, y) and (-x, -y); side: 1 or -1."""
+    below = rx * rx * y * y + ry * ry * x * x
+    root = math.sqrt(max(rx * rx * ry * ry - below, 0.0) / below) * side
+    return root * rx * y / ry, -root * ry * x / rx
 
 
 SHAPES: dict[str, Callable[[_Outline, Mapping[str, str]], None]] = {  # element -> how it is drawn

@@ -82,32 +82,38 @@ class Image:
         if len(raw) < 12:
             return None
         layout, n, rows, flags, high, low, setup, wake, meaning = struct.unpack_from("<8BI", raw)
-        offset = 12
-        size = offset + _AXIS_BYTES * n + (1 + n) * switches + (8 + 2 * n) * rows
-        if layout != _LAYOUT_VERSION or flags > 7 or len(raw) != size:
+        axes_end = 12 + _AXIS_BYTES * n
+        guards_end = axes_end + (1 + n) * switches
+        if layout != _LAYOUT_VERSION or flags > 7 or len(raw) != guards_end + (8 + 2 * n) * rows:
             return None
-        axes = []
-        for _ in range(n):
-            marks, *fields = struct.unpack_from("<BiiiII", raw, offset)
-            offset += _AXIS_BYTES
-            if marks > 3:
-                return None
-            axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))
-        guards = []
-        for _ in range(switches):
-            marks, *weight = struct.unpack_from(f"<B{n}b", raw, offset)
-            offset += 1 + n
-            if marks > 3 or any(weight) != bool(marks & 1):
-                return None
-            guards.append(GuardImage(bool(marks & 2), tuple(weight)))
-        limits = []
-        for _ in range(rows):
-            lower, upper, *weight = struct.unpack_from(f"<ii{n}h", raw, offset)
-            offset += 8 + 2 * n
-            limits.append(RowImage(lower, upper, tuple(weight)))
+        axes, guards = _unpack_axes(raw[12:axes_end]), _unpack_guards(raw[axes_end:guards_end], n)
+        if axes is None or guards is None:
+            return None
+        rows_of_limits = struct.iter_unpack(f"<ii{n}h", raw[guards_end:])
+        limits = tuple(RowImage(lower, upper, tuple(weight)) for lower, upper, *weight in rows_of_limits)
         bits = bool(flags & 1), bool(flags & 2), bool(flags & 4)
-        return cls(tuple(axes), tuple(limits), tuple(guards), *bits, high, low, setup, wake, meaning)
+        return cls(axes, limits, guards, *bits, high, low, setup, wake, meaning)
 
     def crc(self) -> int:
         """The value of INFO's `config` while this image is active."""
         return zlib.crc32(self.pack())
+
+
+def _unpack_axes(raw: bytes) -> tuple[AxisImage, ...] | None:
+    """The axes in some bytes; None if one has unknown marks."""
+    axes = []
+    for marks, *fields in struct.iter_unpack("<BiiiII", raw):
+        if marks > 3:
+            return None
+        axes.append(AxisImage(bool(marks & 1), bool(marks & 2), *fields))
+    return tuple(axes)
+
+
+def _unpack_guards(raw: bytes, n: int) -> tuple[GuardImage, ...] | None:
+    """The switches' guards in some bytes, of a board of n axes; None if one has unknown marks, or weights unmarked."""
+    guards = []
+    for marks, *weight in struct.iter_unpack(f"<B{n}b", raw):
+        if marks > 3 or any(weight) != bool(marks & 1):
+            return None
+        guards.append(GuardImage(bool(marks & 2), tuple(weight)))
+    return tuple(guards)
