@@ -1,4 +1,4 @@
-"""An arm as plain numbers, for other programs: one JSON object in mm and degrees."""
+"""Exports an arm as numbers for other programs: a JSON object in mm and degrees."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ _IDENTITY = {"xyz": [0, 0, 0], "rpy": [0, 0, 0]}
 
 
 def arm_numbers(arm: Arm) -> dict[str, Any]:
-    """Joints with their screws, limits and speeds, DH tables where there are any, the chain's matrices.
+    """Joints with their screws, limits and speeds, DH tables if they exist, and the matrices of the chain.
 
-    `links`: the tool's pose is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n], Z = Rz or Tz.
+    The tool's pose by `links` is links[0] Z1(ratio1 q1) links[1] ... Zn(ratio_n q_n) links[n] with Z = Rz or Tz.
     """
     screws = conventions.screws(arm)
     return {
@@ -36,29 +36,29 @@ def arm_numbers(arm: Arm) -> dict[str, Any]:
 
 
 def _joint_objects(arm: Arm, screws: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """Each joint's name, screw, limits and speeds [deg | mm, per s, per s2]; None for numbers that it has not."""
+    """Name, screw, limits and speeds [deg | mm, per s, per s2] of each joint; None for missing numbers."""
     limits, home, unit = units.limits_out(arm), units.home_out(arm), units.unit_names(arm)
     speeds, accels = (units.joints_out(arm, values).tolist() for values in (arm.max_speed, arm.max_accel))
     joints = []
-    for i, name in enumerate(arm.joint_names):
+    for index, name in enumerate(arm.joint_names):
         joint = {
             "name": name,
-            "type": "prismatic" if arm.prismatic[i] else "revolute",
-            "unit": unit[i],
-            "screw": screws[i],
-            "sign": int(arm.dh_sign[i]),
-            "ratio": float(arm.ratio[i]),
-            "limits": list(limits[i]) if np.isfinite(limits[i]).all() else None,
-            "home": home[i],
-            "max_speed": None if np.isnan(speeds[i]) else speeds[i],
-            "max_accel": None if np.isnan(accels[i]) else accels[i],
+            "type": "prismatic" if arm.prismatic[index] else "revolute",
+            "unit": unit[index],
+            "screw": screws[index],
+            "sign": int(arm.dh_sign[index]),
+            "ratio": float(arm.ratio[index]),
+            "limits": list(limits[index]) if np.isfinite(limits[index]).all() else None,
+            "home": home[index],
+            "max_speed": None if np.isnan(speeds[index]) else speeds[index],
+            "max_accel": None if np.isnan(accels[index]) else accels[index],
         }
         joints.append(joint)
     return joints
 
 
 def _dh_table(arm: Arm, *, modified: bool) -> dict[str, Any] | None:
-    """A DH table with its base and tool, or None if there is none."""
+    """A DH table with its base and tool, or None if the arm has none."""
     try:
         keys = conventions.dh(arm, modified=modified)
     except UsageError:

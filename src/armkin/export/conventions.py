@@ -1,7 +1,7 @@
-"""An arm in another convention: screws, or a Denavit-Hartenberg table, standard or modified.
+"""Converts an arm to another convention: screws, or a Denavit-Hartenberg table, standard or modified.
 
-All are robot files again: limits, drives, tool and the meaning of targets stay. Screws exist for every arm; a DH
-table exists unless two axes are parallel but for rounding, where the foot of their common normal is undetermined.
+Results are robot files with unchanged limits, drives, tool and meaning of targets. Screws exist for every arm. A DH
+table exists unless two axes are parallel except for rounding, as the foot of their common normal is then undetermined.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from armkin.robot_file.robot_file_text import format_robot_file, pose_keys, tidy
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-COORDINATES = 1e-9  # error [mm], at most, of the arm's poses by a table
-PARALLEL = 1e-13  # angle [rad] of axes that have no common normal of their own
-MIN_DISTANCE = 1e-11  # distance [mm] below which it is rounding
+COORDINATES = 1e-9  # largest allowed error [mm] of poses by a DH table
+PARALLEL = 1e-13  # angle [rad] up to which axes count as parallel, without a unique common normal
+MIN_DISTANCE = 1e-11  # distance [mm] below which a length counts as rounding
 
 _GEOMETRY = ("convention", "base", "tool", "zero_pose", "joints")
 
 
 def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
-    """The arm as a robot file with screws: keys and values; tool: by default the file's own.
+    """The keys and values of a robot file with screws; tool: by default that of the file.
 
     >>> import armkin
     >>> screws(armkin.load("robots/three_dof.yaml"))["joints"][1]["screw"]
@@ -50,7 +50,7 @@ def screws(arm: Arm, tool: Array | None = None) -> dict[str, Any]:
 
 
 def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
-    """The arm as a robot file with a DH table: keys and values.
+    """The keys and values of a robot file with a DH table.
 
     Raises UsageError if no table gives the arm's poses to 1e-9 mm.
 
@@ -87,7 +87,7 @@ class _Normal(NamedTuple):
 
 
 def _unsigned_links(arm: Arm) -> Array:
-    """The chain's links with the joints' signs taken out: each z axis is that of the row or screw, not of the joint."""
+    """The links without the joints' signs: each z axis is that of the DH row or screw, not of the joint."""
     flips = [FLIP if sign < 0 else np.eye(4) for sign in arm.dh_sign]
     links = arm.link.copy()
     for i, flip in enumerate(flips):
@@ -97,7 +97,7 @@ def _unsigned_links(arm: Arm) -> Array:
 
 
 def tool_of(arm: Arm) -> Array:
-    """The fixed frame that the robot file has after its last joint."""
+    """The tool frame of the robot file, after its last joint."""
     if arm.file is None:
         return np.eye(4)
 
@@ -105,7 +105,7 @@ def tool_of(arm: Arm) -> Array:
 
 
 def _split_first_link(arm: Arm, link: Array) -> tuple[Array, float, float]:
-    """The base, and what of the first link is a turn about and a shift along the first axis."""
+    """The base, and the turn about and shift along the first axis that are part of the first link."""
     inner = inverse(arm.base) @ link
     if _is_screw_along_z(inner):
         return arm.base, math.atan2(inner[1, 0], inner[0, 0]), float(inner[2, 3])
@@ -113,7 +113,7 @@ def _split_first_link(arm: Arm, link: Array) -> tuple[Array, float, float]:
 
 
 def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
-    """What of the last link belongs to the last row, and the tool that is left."""
+    """The part of the last link that belongs to the last row, and the remaining tool."""
     tool = tool_of(arm)
     inner = link @ inverse(tool)
     theta = math.atan2(inner[1, 0], inner[0, 0])
@@ -121,7 +121,7 @@ def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Ar
         if _is_screw_along_z(inner):
             return _Normal(theta, float(inner[2, 3]), 0.0, 0.0), tool
         return _Normal(0.0, 0.0, 0.0, 0.0), link
-    # A row's frame has its x axis across the joint's axis, and meets it: Denavit and Hartenberg's two conditions.
+    # Denavit and Hartenberg's conditions: the x axis of a row's frame is normal to the joint's axis and intersects it
     x, p = inner[:3, 0], inner[:3, 3]
     a = float(x[:2] @ p[:2])
     if abs(x[2]) < 1e-14 and np.abs(p[:2] - a * x[:2]).max() < MIN_DISTANCE:
@@ -130,15 +130,15 @@ def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Ar
 
 
 def _is_screw_along_z(T: Array) -> bool:
-    """Whether a transform turns about and shifts along z alone."""
+    """Whether a transform is only a turn about z and a shift along z."""
     return bool(np.hypot(T[0, 2], T[1, 2]) < 1e-14 and T[2, 2] > 0 and np.hypot(T[0, 3], T[1, 3]) < MIN_DISTANCE)
 
 
 def _common_normal(link: Array) -> _Normal:
-    """The common normal between a link's two axes: x of the row (Craig, Introduction to Robotics, sect. 3.4).
+    """The common normal of a link's two axes, x of the row (Craig, Introduction to Robotics, sect. 3.4).
 
-    Of parallel axes that normal is taken that starts at the first axis' origin. Of its two directions that with
-    theta in (-90, 90] is taken, whatever the sign of a.
+    For parallel axes the normal starts at the origin of the first axis. Of its two directions, the one with theta in
+    (-90, 90] degrees is used, whatever the sign of a.
     """
     z, p = link[:3, 2], link[:3, 3]
     sine = math.hypot(z[0], z[1])
@@ -167,7 +167,7 @@ def _common_normal(link: Array) -> _Normal:
 
 
 def _is_forward(theta: float) -> bool:
-    """Whether an angle is in (-90, 90] degrees, but for rounding."""
+    """Whether an angle is in (-90, 90] degrees, except for rounding."""
     return -math.pi / 2 + 1e-9 < theta < math.pi / 2 + 1e-9
 
 
@@ -179,7 +179,7 @@ def _degrees(angle: float) -> float:
 def _file_keys(
     arm: Arm, convention: str, rows: list[dict[str, Any]], base: Array, tool: Array, keys: dict[str, Any]
 ) -> dict[str, Any]:
-    """A robot file with these rows, and all else as it was."""
+    """The keys of a robot file with new rows, and everything else unchanged."""
     head, joints, tail = _unchanged_parts(arm)
     file_keys: dict[str, Any] = {**head, "convention": convention}
     for key, frame in (("base", base), ("tool", tool)):
@@ -197,7 +197,7 @@ def _file_keys(
 
 
 def _unchanged_parts(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], dict[str, Any]]:
-    """What a change of convention leaves alone: the file's head, the joints without geometry, and the rest."""
+    """The parts that a change of convention does not affect: head, joints without geometry, and the rest."""
     if arm.file is None:
         return {"name": arm.name}, _joints_without_a_file(arm), {}
     keys = arm.file.model_dump(exclude_unset=True, exclude_none=True)
@@ -210,7 +210,7 @@ def _unchanged_parts(arm: Arm) -> tuple[dict[str, Any], list[dict[str, Any]], di
 
 
 def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
-    """The keys of joints, geometry apart, that say what the arm's arrays do."""
+    """The keys of joints without geometry, from the arrays of the arm."""
     joints = []
     limits, home = units.limits_out(arm), units.home_out(arm)
     for i, name in enumerate(arm.joint_names):
@@ -223,7 +223,7 @@ def _joints_without_a_file(arm: Arm) -> list[dict[str, Any]]:
 
 
 def _keep_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
-    """The pitch of targets counts from where it did: another table's constant angles go to `pitch_offset`."""
+    """The file with a `pitch_offset` that keeps the zero of the targets' pitch."""
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:
             before = task_for(arm, name).offsets[0]
@@ -243,7 +243,7 @@ def _keep_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
 
 
 def differences(arm: Arm, keys: dict[str, Any]) -> list[str]:
-    """What the other table's targets count from elsewhere, in words; [] for most arms."""
+    """Texts about angles of targets whose zero differs with the other table; [] for most arms."""
     try:
         before, after = task_for(arm), task_for(_build_arm(keys))
     except UsageError:
@@ -262,7 +262,7 @@ def _build_arm(keys: dict[str, Any]) -> Arm:
 
 
 def _check_poses(arm: Arm, keys: dict[str, Any], links: Array) -> None:
-    """The table gives the arm's poses, or UsageError says which axes spoil it."""
+    """Raise UsageError, naming the axes, if the table does not give the arm's poses."""
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (20, arm.n)) * np.where(arm.prismatic, 100.0, 1.0)
     sizes = [abs(v) for joint in keys["joints"] for v in (joint["dh"]["a"], joint["dh"]["d"])]
     if max(sizes) < 1e7:
@@ -271,10 +271,10 @@ def _check_poses(arm: Arm, keys: dict[str, Any], links: Array) -> None:
             return
     sines = np.hypot(links[1:-1, 0, 2], links[1:-1, 1, 2])
     sines = np.where(sines > PARALLEL, sines, np.inf)
-    k = int(np.argmin(sines))
-    angle = f"{math.degrees(sines[k]):.2g}"
+    worst = int(np.argmin(sines))
+    angle = f"{math.degrees(sines[worst]):.2g}"
     raise UsageError(
-        f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {arm.joint_names[k]} and "
-        f"{arm.joint_names[k + 1]} are {angle} deg from parallel, so that their common normal is far away; "
+        f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {arm.joint_names[worst]} and "
+        f"{arm.joint_names[worst + 1]} are {angle} deg from parallel, so that their common normal is far away; "
         "screws say it exactly"
     )

@@ -1,8 +1,8 @@
-"""An arm as URDF: joints with limits and speeds, links as cylinders and balls.
+"""Writes an arm as URDF: joints with limits and speeds, links as cylinders and spheres.
 
-Metres and radians, as the format wants. A link's frame is its joint's, with z along the axis; the last link,
-`tool`, is the TCP. Of a calibrated arm joint values are the actual ones, as a URDF knows no ratio. What a
-robot file has and a URDF has not (home, accelerations, drives) is left out.
+Units are metres and radians, as URDF requires. The frame of a link is that of its joint, with z along the axis; the
+last link, `tool`, is the TCP. For a calibrated arm, joint values are the actual ones, as URDF has no ratio. Home,
+accelerations and drives are omitted, because URDF cannot express them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 METRE = 1000.0  # metre [mm]
 LINK_RADIUS = 0.035  # radius of a link, as a share of the reach
-MIN_LENGTH = 1e-6  # length [mm] below which a piece is not drawn
+MIN_LENGTH = 1e-6  # length [mm] below which a part of a link is not drawn
 
 _COLOURS = (("body", "0.85 0.85 0.85 1"), ("joint", "0.25 0.35 0.5 1"))
 
@@ -36,28 +36,31 @@ def urdf_text(arm: Arm) -> str:
     >>> urdf_text(armkin.load("robots/three_dof.yaml")).splitlines()[2]
     '<robot name="three_dof">'
     """
-    turned = actual_arm(arm)
+    actual = actual_arm(arm)
     links = ["base_link"]
     for name in arm.joint_names:
         links.append(_free_name(f"{name}_link", tuple(links)))
-    radius, form = LINK_RADIUS * arm.reach, arm_shape(turned)
+    radius, shape = LINK_RADIUS * arm.reach, arm_shape(actual)
     lines = [
         '<?xml version="1.0"?>',
         f"<!-- {_comment_text(arm)} -->",
         f"<robot name={quoteattr(arm.name)}>",
         *(f'  <material name="{name}"><color rgba="{rgba}"/></material>' for name, rgba in _COLOURS),
-        *_link_lines("base_link", _body_lines(form.bodies[0], radius)),
+        *_link_lines("base_link", _body_lines(shape.bodies[0], radius)),
     ]
-    for i, name in enumerate(arm.joint_names):
-        lines += _joint_lines(turned, i, name, links[i], links[i + 1])
+    for index, name in enumerate(arm.joint_names):
+        lines += _joint_lines(actual, index, name, links[index], links[index + 1])
         lines += _link_lines(
-            links[i + 1],
-            [_hub_lines(float(form.joint_offsets[i]), radius), *_body_lines(form.bodies[i + 1], radius * 0.85)],
+            links[index + 1],
+            [
+                _hub_lines(float(shape.joint_offsets[index]), radius),
+                *_body_lines(shape.bodies[index + 1], radius * 0.85),
+            ],
         )
     tool = _free_name("tool", tuple(links))
     lines += [
         f'  <joint name="{_free_name("tool_joint", arm.joint_names)}" type="fixed">',
-        *_place_lines(turned.link[-1], links[-1], tool),
+        *_place_lines(actual.link[-1], links[-1], tool),
         "  </joint>",
         f'  <link name="{tool}"/>',
         "</robot>",
@@ -114,24 +117,24 @@ def _link_lines(name: str, pieces: list[list[str]]) -> list[str]:
 
 
 def _body_lines(corners: Array, radius: float) -> list[list[str]]:
-    """A link as `armkin.view.skeleton` shapes it: straight from corner to corner."""
+    """The straight pieces of a link between the corners of `armkin.view.skeleton`."""
     return [_piece_lines(start, end, radius) for start, end in pairwise(corners)]
 
 
 def _hub_lines(offset: float, radius: float) -> list[str]:
-    """A joint: a short cylinder about its axis, `offset` [mm] along it."""
+    """A short cylinder for a joint, at an offset [mm] along its axis."""
     size = f'<cylinder radius="{_metres_text(radius)}" length="{_metres_text(2.2 * radius)}"/>'
     return _visual_lines("joint", f'<origin xyz="0 0 {_metres_text(offset)}" rpy="0 0 0"/>', size)
 
 
 def _piece_lines(start: Array, end: Array, radius: float) -> list[str]:
-    """A cylinder from start to end [mm] in the link's frame, with a ball at its end; [] if there is no way between."""
-    along = end - start
-    length = float(np.linalg.norm(along))
+    """A cylinder from start to end [mm] in the link's frame, with a sphere at its end; [] if both are equal."""
+    direction = end - start
+    length = float(np.linalg.norm(direction))
     if length < MIN_LENGTH:
         return []
-    z = along / length
-    # Ry(pitch) after Rz(yaw) turns z into the piece's direction; a cylinder needs no more.
+    z = direction / length
+    # Rz(yaw) Ry(pitch) turns z into the direction of the piece; a cylinder needs no third angle
     pitch, yaw = math.atan2(math.hypot(z[0], z[1]), z[2]), math.atan2(z[1], z[0])
     centre = " ".join(_metres_text(x) for x in (start + end) / 2)
     ball = " ".join(_metres_text(x) for x in end)
@@ -149,5 +152,5 @@ def _visual_lines(material: str, origin: str, form: str) -> list[str]:
 
 
 def _metres_text(value: float) -> str:
-    """Millimetres of a picture, in metres."""
+    """The text in metres of a length [mm]."""
     return number_text(round(float(value) / METRE, 7))

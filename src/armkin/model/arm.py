@@ -1,4 +1,4 @@
-"""The arm: frozen arrays, one chain for all conventions."""
+"""The arm as frozen arrays, with the same chain for all conventions."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
 class Arm:
     """An arm as arrays, read-only, lengths in mm and angles in rad.
 
-    The tool's pose is ``link[0] Z1(r1 q1) link[1] ... Zn(rn qn) link[n]`` with Z = Rz or Tz and the `ratio` r, 1 but
-    for calibrated arms: signs, offsets, base and tool are inside `link`.
+    The tool's pose is ``link[0] Z1(r1 q1) link[1] ... Zn(rn qn) link[n]`` with Z = Rz or Tz and the `ratio` r, which is
+    1 unless the arm is calibrated. Signs, offsets, base and tool are part of `link`.
 
     Attributes:
-        name: as the robot file says.
+        name: of the robot file.
         joint_names: of all n joints, from the base on.
-        prismatic: (n,) which joints slide; the others turn.
+        prismatic: (n,) whether joints are prismatic; the others are revolute.
         link: (n + 1, 4, 4) [mm] constant transforms between the joints' motions.
         frame: (n, 4, 4) [mm] reported frame i = chain up to Zi, times frame[i].
         base: (4, 4) [mm] of the base in the frame of targets.
@@ -42,32 +42,32 @@ class Arm:
         dh_theta: (n,) [rad].
         ratio: (n,) [1] actual turn per commanded turn; joint values are commanded ones.
         pitch_offset: [rad] added to the sum of the parallel joints' angles in the tasks with a pitch.
-        task: as the file says; None: by structure.
+        task: of the robot file; None: chosen by the structure of the arm.
         motor_gain: (motors, n) [pulses/rad | pulses/mm].
         motor_bias: (motors,) [pulses] at home.
-        reach: [mm] no point of the chain is farther from its first joint; 1, a unit, where all lengths are zero.
+        reach: [mm] bound of the distance of the chain's points from its first joint; 1 if all lengths are zero.
         pose_names: of the robot file's poses, besides home.
         pose_joints: (poses, n) [rad | mm].
         held: names of joints that `armkin.lock` has folded into the links.
         motors: in the order of the pulses; () for an arm without a robot file.
-        homing: of every joint, None where there is none.
-        hard_limits: of every joint whether its switch stops every motion into it.
-        body_radius: (n + 1,) [mm] of the base and of what each joint moves, nan where not said.
+        homing: of every joint, None without homing.
+        hard_limits: of every joint, whether its switch stops motions into it.
+        body_radius: (n + 1,) [mm] of the base and of each joint's body, nan where the file has none.
         keep_out: of the robot file, then of the scene.
-        clearance: [mm] that is kept from them.
-        ignores_keep_out: motions are not proved: on the operator's word.
+        clearance: [mm] distance to keep from keep-outs.
+        ignores_keep_out: whether motions are not checked against keep-outs, at the operator's request.
         scene: the scene's file, as given.
         scene_sha256: of its bytes.
         tool: x, y, z, roll, pitch, yaw [mm, deg] in place of the file's.
-        of_scene: how many of `keep_out`, its last ones, are the scene's.
-        whole: with keep-outs: what `armkin.lock` was given.
-        gripper: as the file says.
-        board: as the file says.
+        of_scene: number of keep-outs, the last ones, that come from the scene.
+        whole: the arguments of `armkin.lock` for an arm with keep-outs.
+        gripper: of the robot file.
+        board: of the robot file.
         path: of the robot file, as given.
         sha256: of the robot file's bytes.
-        description: as the file says.
-        source: where the numbers come from.
-        file: the robot file, for whoever prints the file itself; all that arms do is in the fields above.
+        description: of the robot file.
+        source: origin of the numbers.
+        file: the robot file, for printing it; the fields above are sufficient for all computations.
     """
 
     name: str
@@ -114,7 +114,7 @@ class Arm:
     file: RobotFile | None = None
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        """A copy, or what was pickled, is read-only, too: caches hold code for its values."""
+        """Make a copied or unpickled arm read-only as well, because caches hold code for its values."""
         for value in state.values():
             if isinstance(value, np.ndarray):
                 value.flags.writeable = False
@@ -131,13 +131,13 @@ class Arm:
         return {"home": self.home, **dict(zip(self.pose_names, self.pose_joints, strict=True))}
 
     def __repr__(self) -> str:
-        """What tells arms apart, without their arrays."""
+        """The name and the joints."""
         return f"<Arm {self.name}: {', '.join(self.joint_names)}>"
 
 
 @lru_cache(maxsize=256)
 def actual_arm(arm: Arm) -> Arm:
-    """The arm in actual joint values, ratio 1: limits, home and speeds are those of the actual motion.
+    """The arm in actual joint values, with ratios of 1, and limits, home and speeds of the actual motion.
 
     An arm whose ratios are all 1 is returned as it is.
     """
@@ -170,9 +170,9 @@ def from_links(
     task: str | None = None,
     motor_gain: ArrayLike | None = None,
 ) -> Arm:
-    """An arm from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the others as `Arm` has them.
+    """An arm made from its chain: link (n + 1, 4, 4) [mm], limits (n, 2) [rad | mm], the others as in `Arm`.
 
-    All else is as of an arm without a robot file: joints q1, q2, ... that are 0 at home, no poses, no board.
+    All other fields are those of an arm without a robot file: joints q1, q2, ..., 0 at home, no poses, no board.
     """
     n = len(prismatic)
     links = freeze(link)
@@ -210,7 +210,7 @@ def from_links(
 def _reach(link: Array, travel: Array) -> float:
     """Sum [mm] of the lengths of the links (n + 1, 4, 4) after the first joint and of the slides' travel (k, 2).
 
-    A limit that is infinite adds nothing.
+    An infinite limit adds nothing.
     """
     link_lengths = np.linalg.norm(link[1:, :3, 3], axis=1)
     slide_lengths = np.abs(np.where(np.isfinite(travel), travel, 0.0)).max(axis=1)
@@ -222,7 +222,7 @@ def _as_array(values: ArrayLike | None, default: Array) -> Array:
 
 
 def freeze(values: ArrayLike, dtype: type = float) -> NDArray[Any]:
-    """A copy that cannot be written to: caches hold code for an arm's values."""
+    """A read-only copy, as caches hold code for the values of an arm."""
     array: NDArray[Any] = np.array(values, dtype=dtype)
     array.flags.writeable = False
     return array

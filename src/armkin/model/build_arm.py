@@ -1,4 +1,4 @@
-"""A validated robot file turned into an arm: DH tables and screws become one chain of constant links."""
+"""Builds an arm from a validated robot file; DH tables and screws become a chain of constant links."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def load_arm(path: str | PathLike[str]) -> Arm:
 
 
 def arm_of_file(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
-    """The arm of a validated robot file, with a scene's keep-outs behind the file's own.
+    """The arm of a validated robot file, with the keep-outs of a scene after its own.
 
     tool: x, y, z, roll, pitch, yaw [mm, deg] after the last joint, in place of the file's.
     """
@@ -76,7 +76,7 @@ def arm_of_file(file: RobotFile, scene: Scene | None = None, tool: Sequence[floa
 
 
 def _joint_fields(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
-    """The arm's other fields that have an entry for each joint; unit: (n,) rad | mm of the file's degree | mm."""
+    """The other fields with an entry for each joint; unit: (n,) [rad | mm] of a degree or mm in the file."""
     return {
         "joint_names": tuple(j.name for j in joints),
         "home": freeze(np.array([j.home for j in joints]) * unit),
@@ -92,25 +92,25 @@ def _joint_fields(joints: Sequence[Joint], unit: Array) -> dict[str, Any]:
 
 def _chain(file: RobotFile, base: Array) -> tuple[list[Array], list[Array]]:
     """The constant links before, between and after the joints, and each joint's frame after its motion."""
-    end = transform(file.tool.xyz, file.tool.rpy)
+    tool = transform(file.tool.xyz, file.tool.rpy)
     if file.zero_pose is not None:
-        end = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ end
+        tool = transform(file.zero_pose.xyz, file.zero_pose.rpy) @ tool
     joints = [_joint_factors(joint, file.convention) for joint in file.joints]
-    between = [joint.after @ following.before for joint, following in pairwise(joints)]
-    links = [base @ joints[0].before, *between, joints[-1].after @ end]
+    inner_links = [joint.after @ following.before for joint, following in pairwise(joints)]
+    links = [base @ joints[0].before, *inner_links, joints[-1].after @ tool]
     return links, [joint.frame for joint in joints]
 
 
 class _JointFactors(NamedTuple):
-    """Constant transforms (4, 4) [mm] of one joint, whose own transform is ``before Z(q) after``."""
+    """Constant transforms (4, 4) [mm] of a joint, whose whole transform is ``before Z(q) after``."""
 
     before: Array
     after: Array
-    frame: Array  # from the joint's motion to the frame that its convention gives it
+    frame: Array  # from the joint's motion to its frame by the convention
 
 
 def _joint_factors(joint: Joint, convention: str) -> _JointFactors:
-    """A joint's factors by its screw or its row of the table; sign -1 turns its axis round."""
+    """The factors of a joint by its screw or DH row; sign -1 reverses its axis."""
     modified = convention == "modified"
     factors = _screw_factors(joint) if convention == "screws" else _dh_factors(joint, modified=modified)
     flip = FLIP if joint.sign < 0 else np.eye(4)
@@ -118,12 +118,12 @@ def _joint_factors(joint: Joint, convention: str) -> _JointFactors:
 
 
 def _numbers_or_nan(values: Iterable[float | None]) -> Array:
-    """Numbers of which the file may leave some out, nan there."""
+    """An array of numbers, nan for those that the file omits."""
     return np.array([math.nan if value is None else value for value in values])
 
 
 def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
-    """The arm's fields about keep-outs; none where there are none, so that such an arm is built as ever."""
+    """The arm's fields about keep-outs; empty without keep-outs."""
     if not file.keep_out and scene is None:
         return {}
     radii = _numbers_or_nan(body.radius if body else None for body in (file.base.body, *(j.body for j in file.joints)))
@@ -138,8 +138,8 @@ def _keep_outs(file: RobotFile, scene: Scene | None) -> dict[str, Any]:
 def _dh_factors(joint: Joint, *, modified: bool) -> _JointFactors:
     """The factors of a row of a Denavit-Hartenberg table.
 
-    Standard: A = Rz(theta + q) Tz(d) Tx(a) Rx(alpha). Modified (Craig): the row's a and
-    alpha stand before the joint: A = Rx(alpha) Tx(a) Rz(theta + q) Tz(d).
+    Standard: A = Rz(theta + q) Tz(d) Tx(a) Rx(alpha). Modified (Craig), with a and alpha
+    before the joint: A = Rx(alpha) Tx(a) Rz(theta + q) Tz(d).
     """
     assert joint.dh is not None
     dh = joint.dh
@@ -154,7 +154,7 @@ def _dh_factors(joint: Joint, *, modified: bool) -> _JointFactors:
 
 
 def _screw_factors(joint: Joint) -> _JointFactors:
-    """The factors of exp([S] q) = B Z(q) B^-1, B's z axis on the screw's (Lynch & Park, Modern Robotics, 3.3.2)."""
+    """The factors of exp([S] q) = B Z(q) B^-1, B's z axis on the screw axis (Lynch & Park, Modern Robotics, 3.3.2)."""
     assert joint.screw is not None
     w, v = (np.array(part, dtype=float) for part in joint.twist())
     if joint.type == "prismatic":
@@ -174,36 +174,36 @@ def _screw_factors(joint: Joint) -> _JointFactors:
 
 def _perpendicular(z: Array) -> Array:
     """A unit vector perpendicular to z, exact for axis-aligned z."""
-    across = np.zeros(3)
-    across[int(np.argmin(np.abs(z)))] = 1.0
-    x = across - (across @ z) * z
+    unit_vector = np.zeros(3)
+    unit_vector[int(np.argmin(np.abs(z)))] = 1.0
+    x = unit_vector - (unit_vector @ z) * z
     return np.asarray(x / np.linalg.norm(x))
 
 
 def _motor_gain_and_bias(file: RobotFile, unit: Array) -> tuple[Array, Array]:
     """Pulses per rad | mm of every motor and joint, and the pulses at home (servos only).
 
-    A stepper's pulses per turn of the joint are full_steps x microsteps x gear x pulley,
-    counted from home; a servo's pulse width is linear in its joint over `travel`, a bus
-    servo's count in its joint from `zero`, and `invert` mirrors both (for a stepper it is
-    wiring: the level of DIR, not the count).
+    A stepper's pulses for a turn of the joint are full_steps x microsteps x gear x pulley,
+    counted from home. The pulse width of a servo is linear in its joint over `travel`, and
+    the count of a bus servo is linear in its joint from `zero`. For servos `invert` mirrors
+    the pulses; for steppers it inverts only the level of DIR.
     """
     index = {joint.name: i for i, joint in enumerate(file.joints)}
     home = [joint.home for joint in file.joints]
     motors = file.motor_list()
     gain = np.zeros((len(motors), len(file.joints)))
     bias = np.zeros(len(motors))
-    for k, motor in enumerate(motors):
-        turn = -1.0 if motor.kind != "stepper" and motor.invert else 1.0
+    for number, motor in enumerate(motors):
+        direction = -1.0 if motor.kind != "stepper" and motor.invert else 1.0
         for name, weight in motor.joints.items():
-            gain[k, index[name]] = turn * weight * motor.pulses_per_unit()
+            gain[number, index[name]] = direction * weight * motor.pulses_per_unit()
         if (pulses_at_zero := _pulses_at_zero(motor)) is not None:
-            bias[k] = pulses_at_zero + gain[k] @ home
+            bias[number] = pulses_at_zero + gain[number] @ home
     return gain / unit, bias
 
 
 def _pulses_at_zero(motor: Motor) -> float | None:
-    """Pulse width [us] or count of a servo whose joint is at 0; None where pulses count from home."""
+    """Pulse width [us] or count of a servo with its joint at 0; None for steppers, which count from home."""
     if motor.kind == "bus":
         return motor.zero
     if motor.kind == "servo" and motor.pulse_us is not None and motor.travel is not None:

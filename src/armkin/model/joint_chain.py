@@ -1,4 +1,4 @@
-"""Chains of joints as the geometries of `armkin.ik` see them: flipped, reversed, shortened."""
+"""Chains of joints for the solvers of `armkin.ik`, and their reversal."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Chain(NamedTuple):
 
 
 def reverse_chain(chain: Chain) -> Chain:
-    """The chain walked from the tool to the base: its pose is the inverse, its joints are in reverse order."""
+    """The chain from the tool to the base, with the inverse pose and the joints in reverse order."""
     links = FLIP @ inverse(chain.link[::-1]) @ FLIP
     links[0] = FLIP @ links[0]
     links[-1] = links[-1] @ FLIP

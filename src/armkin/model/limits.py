@@ -1,4 +1,4 @@
-"""Which joints are outside their limits."""
+"""Joint limits: which joints are outside, and texts about them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from armkin.model.units import DEGREE, finite_or_none, limits_out
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-SLACK = 1e-9  # distance [rad | mm] outside at which a joint still counts as on its limit
+SLACK = 1e-9  # distance [rad | mm] outside a limit up to which a joint counts as at the limit
 
 
 def outside_limits(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
@@ -31,14 +31,14 @@ def outside_limits(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
 
 
 def limit_fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
-    """Fields of the error about a joint outside its limits: joint, value, lower, upper [deg | mm]; None: unlimited."""
+    """Fields of an error about a joint outside its limits: joint, value, lower, upper [deg | mm], None if unlimited."""
     unit = 1.0 if arm.prismatic[joint] else DEGREE
     lower, upper = map(finite_or_none, limits_out(arm)[joint])
     return {"joint": arm.joint_names[joint], "value": float(value) / unit, "lower": lower, "upper": upper}
 
 
 def outside_text(arm: Arm, joint: int, value: float) -> str:
-    """A joint outside its limits in words.
+    """A text about a joint outside its limits.
 
     value: [rad | mm].
 
@@ -55,7 +55,7 @@ def outside_text(arm: Arm, joint: int, value: float) -> str:
 def check_limits(arm: Arm, targets: NDArray[np.float64]) -> None:
     """Raise NoSolutionError, naming row and joint, if a target (w, n) is outside the joint limits.
 
-    A straight line between two poses within the limits stays within them.
+    A straight line between two postures within the limits is within them, too.
     """
     if targets.shape[-1] != arm.n:
         raise UsageError(f"{arm.name} has {arm.n} joints: expected {arm.n} values, got {targets.shape[-1]}")

@@ -1,4 +1,4 @@
-"""Arms with joints held at fixed values: how a redundant arm becomes one that `ik` can solve."""
+"""Arms with joints held at fixed values, so that `ik` can solve a redundant arm."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
 
 
 def _check_held(arm: Arm, held: Mapping[str, float]) -> None:
-    """Raise UsageError unless the joints exist, their values are finite and one joint at least stays free."""
+    """Raise UsageError unless the joints exist, their values are finite and at least one joint stays free."""
     for name, value in held.items():
         joint_index(arm, name)
         number = arrays.real_array(value, name)
@@ -72,7 +72,7 @@ def _check_held(arm: Arm, held: Mapping[str, float]) -> None:
 
 
 def _links_with_held_motions(arm: Arm, held: Mapping[str, float]) -> Array:
-    """The chain's constant links (free joints + 1, 4, 4) [mm]: each held joint's motion is part of the link before."""
+    """The constant links (free joints + 1, 4, 4) [mm]; the motion of a held joint is part of the previous link."""
     links = [arm.link[0]]
     for i, name in enumerate(arm.joint_names):
         if name in held:
@@ -108,11 +108,11 @@ def unlock(arm: Arm, held: Mapping[str, float], q: ArrayLike) -> Array:
     values = arrays.real_array(q, "joint values")
     if values.ndim == 0 or values.shape[-1] != arm.n - len(held):
         raise UsageError(f"expected the {arm.n - len(held)} joint values that are not held, got shape {values.shape}")
-    missing = np.isnan(values).any(axis=-1)
+    is_missing = np.isnan(values).any(axis=-1)
     joints = np.empty((*values.shape[:-1], arm.n))
     remaining = iter(range(values.shape[-1]))
     for i, name in enumerate(arm.joint_names):
-        joints[..., i] = np.where(missing, np.nan, held[name]) if name in held else values[..., next(remaining)]
+        joints[..., i] = np.where(is_missing, np.nan, held[name]) if name in held else values[..., next(remaining)]
     return joints
 
 
@@ -120,6 +120,6 @@ def joint_index(arm: Arm, name: str) -> int:
     """Index of a joint by its name; UsageError lists the names."""
     if name in arm.joint_names:
         return arm.joint_names.index(name)
-    close = get_close_matches(name, arm.joint_names, 1, 0.5)
-    hint = f" (did you mean {close[0]}?)" if close else ""
+    similar_names = get_close_matches(name, arm.joint_names, 1, 0.5)
+    hint = f" (did you mean {similar_names[0]}?)" if similar_names else ""
     raise UsageError(f"{arm.name} has no joint '{name}'{hint}; its joints are {', '.join(arm.joint_names)}")

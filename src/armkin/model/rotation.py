@@ -10,35 +10,34 @@ from numpy.typing import ArrayLike
 
 from armkin.formula.arrays import Array
 
-# Turns z and y over: conjugating a joint's motion with it reverses the joint.
-BLOCK_ROWS = 2_048  # rows worked on at once: all their arrays fit the cache
-FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
+BLOCK_ROWS = 2_048  # rows computed together, so that their arrays fit the cache
+FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # half a turn about x, which reverses a joint's axis by conjugation
 
 
 def rpy(R: ArrayLike) -> Array:
     """Roll, pitch, yaw of rotations: R = Rz(yaw) Ry(pitch) Rx(roll).
 
-    R: (..., 3, 3). Returns (..., 3) [rad], pitch in [-pi/2, pi/2]. Where the pitch is a quarter turn only
-    yaw - roll or yaw + roll is determined: roll is 0 there (Craig, Introduction to Robotics, eq. 2.67).
+    R: (..., 3, 3). Returns (..., 3) [rad], pitch in [-pi/2, pi/2]. If the pitch is a quarter turn, only
+    yaw - roll or yaw + roll is determined, and roll is set to 0 (Craig, Introduction to Robotics, eq. 2.67).
 
     >>> rpy([[0, -1, 0], [1, 0, 0], [0, 0, 1]]).round(6).tolist()
     [0.0, 0.0, 1.570796]
     """
     R = np.asarray(R, dtype=float)
-    level = np.hypot(R[..., 0, 0], R[..., 1, 0])
-    pitch = np.arctan2(-R[..., 2, 0], level)
-    # below 1e-9 the quotients are rounding noise
-    upright = level < 1e-9
-    roll = np.where(upright, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
-    yaw = np.where(upright, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
+    cos_pitch = np.hypot(R[..., 0, 0], R[..., 1, 0])
+    pitch = np.arctan2(-R[..., 2, 0], cos_pitch)
+    # below 1e-9, roll and yaw would be rounding noise
+    is_singular = cos_pitch < 1e-9
+    roll = np.where(is_singular, 0.0, np.arctan2(R[..., 2, 1], R[..., 2, 2]))
+    yaw = np.where(is_singular, np.arctan2(-R[..., 0, 1], R[..., 1, 1]), np.arctan2(R[..., 1, 0], R[..., 0, 0]))
     return np.stack([roll, pitch, yaw], axis=-1) + 0.0  # no negative zeros
 
 
 def quaternion(R: ArrayLike) -> Array:
     """Unit quaternions w, x, y, z of rotations, w >= 0.
 
-    R: (..., 3, 3). Returns (..., 4). The largest of the four components is taken from the diagonal and
-    divides the others, so that none is lost near half a turn (Shepperd, Quaternion from rotation
+    R: (..., 3, 3). Returns (..., 4). The largest of the four components comes from the diagonal and
+    divides the others, so that no digits are lost near half a turn (Shepperd, Quaternion from rotation
     matrix, 1978).
 
     >>> quaternion([[1, 0, 0], [0, -1, 0], [0, 0, -1]]).tolist()
@@ -78,7 +77,7 @@ def rotation_about(axis: int, angle: ArrayLike) -> Array:
 
 
 def joint_motion(prismatic: bool, q: ArrayLike) -> Array:
-    """Z(q) (..., 4, 4): turns of q (...) [rad] about z, or shifts of q along z."""
+    """The motion Z(q) (..., 4, 4): turns by q (...) [rad] about z, or shifts by q along z."""
     Z = np.zeros((*np.shape(q), 4, 4)) + np.eye(4)
     if prismatic:
         Z[..., 2, 3] = q
@@ -120,33 +119,33 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 
 def transforms(xyz: Array, rpy: Array) -> Array:
-    """The `transform` of each row, to the same bits: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
+    """The `transform` of each row, with identical results: (..., 3) [mm], (..., 3) [deg] -> (..., 4, 4)."""
     matrices = np.zeros((*xyz.shape[:-1], 4, 4))
-    every, place, angles = matrices.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
-    for start in range(0, len(every), BLOCK_ROWS):
+    all_rows, positions, angles = matrices.reshape(-1, 4, 4), xyz.reshape(-1, 3), rpy.reshape(-1, 3)
+    for start in range(0, len(all_rows), BLOCK_ROWS):
         block = slice(start, start + BLOCK_ROWS)
-        T = every[block]
+        T = all_rows[block]
         (cr, cp, cy), (sr, sp, sy) = _cos_sin_deg(np.ascontiguousarray(angles[block].T))
         cysp, sysp = cy * sp, sy * sp
         T[:, 0, 0], T[:, 0, 1], T[:, 0, 2] = cy * cp, cysp * sr - sy * cr, cysp * cr + sy * sr
         T[:, 1, 0], T[:, 1, 1], T[:, 1, 2] = sy * cp, sysp * sr + cy * cr, sysp * cr - cy * sr
         T[:, 2, 0], T[:, 2, 1], T[:, 2, 2] = -sp, cp * sr, cp * cr
-        T[:, :3, 3], T[:, 3, 3] = place[block], 1.0
+        T[:, :3, 3], T[:, 3, 3] = positions[block], 1.0
     return matrices
 
 
 def _cos_sin_deg(angles: Array) -> tuple[Array, Array]:
-    """`cos_sin_deg` of many; by the C library's functions of single numbers, as numpy's differ in the last bit."""
-    turn = np.zeros(angles.shape, complex)
-    turn.imag = angles * (math.pi / 180)
-    np.exp(turn, out=turn)  # an imaginary number's exp is the C library's cosine and sine
-    cosine, sine = turn.real.copy(), turn.imag.copy()
+    """`cos_sin_deg` of arrays, through the C library, as numpy's functions differ in the last bit."""
+    exponent = np.zeros(angles.shape, complex)
+    exponent.imag = angles * (math.pi / 180)
+    np.exp(exponent, out=exponent)  # exp of an imaginary number uses the C library's cosine and sine
+    cosine, sine = exponent.real.copy(), exponent.imag.copy()
     quarter = np.rint(angles / 90.0)
-    exact = 90.0 * quarter == angles
-    if exact.any():
-        turns = quarter[exact].astype(np.int64) % 4
-        cosine[exact] = np.array([1.0, 0.0, -1.0, 0.0])[turns]
-        sine[exact] = np.array([0.0, 1.0, 0.0, -1.0])[turns]
+    is_multiple = 90.0 * quarter == angles
+    if is_multiple.any():
+        turns = quarter[is_multiple].astype(np.int64) % 4
+        cosine[is_multiple] = np.array([1.0, 0.0, -1.0, 0.0])[turns]
+        sine[is_multiple] = np.array([0.0, 1.0, 0.0, -1.0])[turns]
     return cosine, sine
 
 

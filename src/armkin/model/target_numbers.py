@@ -1,4 +1,4 @@
-"""A target between the numbers of a command line, a row of CSV or JSON [mm, deg] and what `armkin.ik` takes."""
+"""Converts targets between numbers of the command line, CSV or JSON [mm, deg] and targets of `armkin.ik`."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ _UNITS = dict.fromkeys(("theta", "phi", "roll", "pitch", "yaw"), "deg") | dict.f
 
 
 def label_units(labels: Sequence[str]) -> list[str]:
-    """Unit of each of a target's numbers: "mm", "deg", or "" for a direction's components."""
+    """Unit of each number of a target: "mm", "deg", or "" for components of a direction."""
     return [_UNITS.get(name, "mm") for name in labels]
 
 
 def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
-    """Targets (..., m) of a task from [mm, deg] to what `armkin.ik` takes.
+    """Targets of `armkin.ik` from numbers (..., m) of a task [mm, deg].
 
     labels: the task's names of the numbers; a pose becomes (..., 4, 4), with
     R = Rz(yaw) Ry(pitch) Rx(roll).
@@ -37,7 +37,7 @@ def targets_in(labels: Sequence[str], values: ArrayLike) -> Array:
 
 
 def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
-    """Targets (N, m) or (N, 4, 4), as `armkin.ik` takes them, in the command line's numbers [mm, deg]."""
+    """Numbers of the command line [mm, deg] from targets (N, m) or (N, 4, 4) of `armkin.ik`."""
     import numpy as np
 
     if targets.ndim == 3:
@@ -48,5 +48,5 @@ def targets_out(labels: Sequence[str], targets: Array) -> list[list[float]]:
 
 
 def label_scale(labels: Sequence[str]) -> list[float]:
-    """What one unit of each of a target's numbers is in [mm, rad, 1]."""
+    """The size of the unit of each number of a target [mm, rad, 1]."""
     return [DEGREE if unit == "deg" else 1.0 for unit in label_units(labels)]

@@ -1,4 +1,4 @@
-"""From the millimetres and degrees of the command line and of JSON to the API's millimetres and radians, and back.
+"""Converts millimetres and degrees of the command line and JSON to millimetres and radians of the API, and back.
 
 (The robot file's degrees are converted by `armkin.model.build_arm`.)
 """
@@ -37,21 +37,21 @@ def joints_out(arm: Arm, q: ArrayLike) -> Array:
     """Joint values (..., n) from [rad | mm] to [deg | mm]."""
     import numpy as np
 
-    return np.asarray(q, dtype=float) / joint_scale(arm) + 0.0  # + 0.0: no -0.0
+    return np.asarray(q, dtype=float) / joint_scale(arm) + 0.0  # + 0.0 turns -0.0 into 0.0
 
 
 def limits_out(arm: Arm) -> list[tuple[float, float]]:
-    """Limits of each joint [deg | mm], as the robot file has them: 120 and not 119.99999999999999."""
+    """Limits of each joint [deg | mm], as in the robot file: 120 instead of 119.99999999999999."""
     return list(_limits_out(arm))
 
 
 def home_out(arm: Arm) -> list[float]:
-    """Home pose [deg | mm], as the robot file has it."""
+    """Home pose [deg | mm], as in the robot file."""
     return poses_out(arm)["home"]
 
 
 def poses_out(arm: Arm) -> dict[str, list[float]]:
-    """Named poses [deg | mm], home first, as the robot file has them."""
+    """Named poses [deg | mm], home first, as in the robot file."""
     return {name: list(values) for name, values in _poses_out(arm)}
 
 
@@ -66,7 +66,7 @@ def _poses_out(arm: Arm) -> tuple[tuple[str, tuple[float, ...]], ...]:
 
 
 def _as_written(arm: Arm, q: Array) -> tuple[float, ...]:
-    """Joint values [deg | mm] with the fewest digits that mean q: those of a file, which degrees of pi/180 lose."""
+    """Joint values [deg | mm] with the fewest digits that give q, as written in a file before the conversion."""
     return tuple(
         _shortest_number(value, unit) for value, unit in zip(q.tolist(), joint_scale(arm).tolist(), strict=True)
     )
@@ -74,8 +74,8 @@ def _as_written(arm: Arm, q: Array) -> tuple[float, ...]:
 
 def _shortest_number(value: float, unit: float) -> float:
     exact = value / unit + 0.0  # + 0.0: no -0.0
-    shorter = (float(f"{exact:.{digits}g}") for digits in range(6, 17))
-    return next((text for text in shorter if text * unit == value), exact)
+    candidates = (float(f"{exact:.{digits}g}") for digits in range(6, 17))
+    return next((number for number in candidates if number * unit == value), exact)
 
 
 def angles_out(angles: ArrayLike) -> Array:
@@ -86,12 +86,12 @@ def angles_out(angles: ArrayLike) -> Array:
 
 
 def finite_or_none(value: float) -> float | None:
-    """A number for JSON, which has neither infinity nor nan: null."""
+    """A number for JSON; None for infinity and nan, which JSON does not have."""
     return float(value) if math.isfinite(value) else None
 
 
 def joint_scale(arm: Arm) -> Array:
-    """What one unit of each joint, a degree or a millimetre, is in [rad | mm]: (n,)."""
+    """The size of the unit of each joint, a degree or a millimetre, in [rad | mm]: (n,)."""
     import numpy as np
 
     return np.where(arm.prismatic, 1.0, DEGREE)
@@ -99,7 +99,7 @@ def joint_scale(arm: Arm) -> Array:
 
 @lru_cache(maxsize=256)
 def radian_or_reach(arm: Arm) -> Array:
-    """What motions of joints are compared in: a radian, of a sliding joint the arm's reach [mm]: (n,), read-only."""
+    """Units to compare motions of joints: a radian, or the reach [mm] for a prismatic joint: (n,), read-only."""
     import numpy as np
 
     unit = np.where(arm.prismatic, arm.reach, 1.0)

@@ -1,4 +1,4 @@
-"""An arm's formulas, recorded for languages that have one number a variable: candidates, targets."""
+"""Recorded formulas of an arm for C and JavaScript: candidates and targets."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ if TYPE_CHECKING:
 
 
 def goal_size(task: Task) -> int:
-    """Numbers of a target as the formulas take them."""
+    """Number of inputs of the formulas for a target."""
     return 12 if task.orientation == "full" else len(task.labels)
 
 
 def record_candidates(
     arm: Arm, task: Task, geometry: Geometry, prefer: bool = True, measured: bool = False
 ) -> recording.Recording:
-    """A closed form's candidates: joint values, their squared residual, doubt.
+    """Candidates of a closed form: joint values, squared residuals, doubt.
 
-    `measured`: before the doubt the residual's two parts, of lengths and of angles. Inputs: the target's numbers; with
-    `prefer` also what a free joint is given: a cosine and a sine for each joint, or the value of a slide; without it,
-    last, whether a joint is free.
+    With `measured`, the residuals of lengths and of angles precede the doubt. Inputs are the numbers of the target and,
+    with `prefer`, the value of each joint if it is free, as cosine and sine, or as length for a slide. Without
+    `prefer`, the last output tells whether a joint is free.
     """
     recorded, n, entries = Recorded(arm, task, geometry), arm.n, goal_size(task)
 
@@ -50,7 +50,7 @@ def record_candidates(
 
 
 def record_target(arm: Arm, task: Task) -> recording.Recording:
-    """The target that joint values answer, as people give it: a pose row by row, or the task's numbers."""
+    """The target that joint values reach, as given by users: a pose row by row, or the numbers of the task."""
 
     def formula(q: list[Any]) -> list[Any]:
         T = forward.tip_formula(arm, q)
@@ -65,12 +65,12 @@ def record_target(arm: Arm, task: Task) -> recording.Recording:
 
 
 def by_branch(recorded: recording.Recording, code: Code) -> list[list[str]]:
-    """The expressions of every output, one for every branch of all branch axes."""
+    """The expressions of every output, one for each branch of all branch axes."""
     shape = np.broadcast_shapes((1, 1, 1), *(recording.axes_of(x) for x in recorded.outputs))
     return [_spread_over_branches(x, texts, shape) for x, texts in zip(recorded.outputs, code.outputs, strict=True)]
 
 
 def _spread_over_branches(node: Any, texts: list[str], shape: tuple[int, ...]) -> list[str]:
-    """An output's expressions for every branch of all branch axes."""
+    """The expressions of an output for each branch of all branch axes."""
     index = np.arange(len(texts)).reshape(recording.axes_of(node) or (1,))
     return [texts[k] for k in np.broadcast_to(index, shape).ravel()]

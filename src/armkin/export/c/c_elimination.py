@@ -1,6 +1,6 @@
-"""The general elimination as C: the method is the same for all arms (`_METHOD`), its constants are data.
+"""The general elimination as C: the method is the same for all arms (`_METHOD`), and its constants are data.
 
-See `armkin.inverse.elimination.method` for the method and why it is complete.
+`armkin.inverse.elimination.method` explains the method and why it is complete.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-# each part needs those before it
+# each part needs the previous ones
 _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
-_NAMED = {  # numbers that the method reads, by the names that they have in Python
+_NAMED = {  # numbers of the method, by their names in Python
     name: getattr(tolerances, name)
     for name in (
         "ALONE", "BLURRED_ROOT", "CLOSE_RESIDUAL", "DOUBLE", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED", "GRAZING", "ILL",
@@ -43,33 +43,33 @@ _NAMED = {  # numbers that the method reads, by the names that they have in Pyth
     )
 }  # fmt: skip
 BRANCHES = MAX_ANSWERS
-ACCEPTED = 1e-18  # squared residual that every answer of the C code stays below
-OWN_PENCILS = 2  # pencils of its own that a kind of poses has
-PASSES = 4  # passes, of the seven, that the C code makes; what they leave open is told as doubt
+ACCEPTED = 1e-18  # bound of the squared residual of answers of the C code
+OWN_PENCILS = 2  # special pencils of each kind of poses
+PASSES = 4  # passes of the C code, of seven in Python; unsolved cases are reported as doubt
 
 
 def has_form(elimination: Elimination) -> bool:
-    """Whether all pencils of poses in general are such as C has."""
+    """Whether C can read all pencils for general poses."""
     return bool(elimination.plans) and all(map(_is_read, elimination.plans[:PASSES]))
 
 
 def _is_read(pencil: Pencil) -> bool:
-    """Whether a pencil carries the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
+    """Whether a pencil has the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
     return pencil.role.slot == 1 or (pencil.role.at_an_end and pencil.ends.rank == 9)
 
 
 def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
-    """The pencils of poses of each kind: the first two are the kind's own, if they have a form, to keep data few."""
-    every = [elimination.of_kind(kind)[:OWN_PENCILS] for kind in Kind]
+    """The pencils for each kind of poses; the first two are special for the kind, if C can read them."""
+    special_pencils = [elimination.of_kind(kind)[:OWN_PENCILS] for kind in Kind]
     usual = elimination.plans[:passes]
-    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in every]
+    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in special_pencils]
 
 
 def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:
-    """Different pencils of plans, and the plans as their numbers."""
-    every = {(pencil.role, pencil.psi): pencil for plans in kinds for pencil in plans}
-    place = {key: number for number, key in enumerate(every)}
-    return list(every.values()), [[place[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
+    """The distinct pencils of plans, and the plans as indices of pencils."""
+    distinct = {(pencil.role, pencil.psi): pencil for plans in kinds for pencil in plans}
+    numbers = {key: number for number, key in enumerate(distinct)}
+    return list(distinct.values()), [[numbers[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
 
 
 def candidates_code(
@@ -80,10 +80,10 @@ def candidates_code(
     lanes: str = "",
     held: Redundancy | None = None,
 ) -> str:
-    """`arm_candidates` of an arm that the elimination solves, and all that it needs.
+    """`arm_candidates` for an arm that the elimination solves, with its data and functions.
 
-    lanes: C in which `arm_first_pass` takes several poses at once, where there are vectors and no slides. held: the
-    joint that stands where near has it, of an arm that has one to spare; the elimination is that of the others.
+    lanes: C code in which `arm_first_pass` solves several poses together, for processors with vectors and arms without
+    slides. held: the redundant joint, which is held at its value in near; the elimination is that of the others.
     """
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
@@ -112,7 +112,7 @@ def candidates_code(
 
 
 def _definitions(length: float, reach: float, array_sizes: dict[str, int]) -> list[str]:
-    """The lines that define array sizes and the numbers that the method reads; length: the loop's unit [mm]."""
+    """The lines that define array sizes and numbers of the method; length: the unit of the loop [mm]."""
     numbers = {"LENGTH": length, "RESIDUAL": (length / reach) ** 2, "BESIDE": BESIDE_SPECIAL, **_NAMED}
     numbers |= {"MAIN_TILT": TILT[0], "LATER_TILT": TILT[1], "REGULAR": REGULAR, "STEADY": STEADY_ENTRY}
     texts = {name: str(size) for name, size in array_sizes.items()}
@@ -121,7 +121,7 @@ def _definitions(length: float, reach: float, array_sizes: dict[str, int]) -> li
 
 
 def _chain_arrays(loop: Loop, task: Task, passes: int) -> list[str]:
-    """The arrays of the loop's frames, of the residual's weights and of how each pass moves the pose."""
+    """The arrays of the loop's frames, the weights of residuals, and the motion of the pose in each pass."""
     return [
         "/* The chain, lengths in ARM_LENGTH, its frames moved along the axes to where the links are short. */",
         _array_code("from_base", frame_rows(inverse(loop.base))),
@@ -135,19 +135,19 @@ def _chain_arrays(loop: Loop, task: Task, passes: int) -> list[str]:
 
 
 def _array_sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
-    """How large arrays of the method are."""
+    """Sizes of arrays of the method."""
     return {
         "PASSES": passes,
         "PRODUCTS": max(pencil.products for pencil in pencils),
         "WIDTH": max((4 if pencil.role.wide else 2) * (pencil.products + pencil.size) for pencil in pencils),
-        "MOST": max(16, *(-(-pencil.size // 4) * 4 for pencil in pencils)),  # rows are worked on by fours
+        "MOST": max(16, *(-(-pencil.size // 4) * 4 for pencil in pencils)),  # rows are processed in groups of four
         "ROWS": max(15 - pencil.ends.rank for pencil in pencils),
         "ANSWERS": passes * max(pencil.size for pencil in pencils),
     }
 
 
 def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
-    """A pencil's numbers, rows of fifteen sixteen apart; None for those that its slot has not."""
+    """The arrays of a pencil, with rows of 15 padded to 16; None for arrays that its slot does not have."""
     slot, ends = pencil.role.slot, pencil.ends
     return {
         "links": np.concatenate([frame_rows(link) for link in pencil.links]),
@@ -164,12 +164,12 @@ def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
 
 
 def moves_of(passes: int) -> list[Array]:
-    """How each pass moves the pose, as frames."""
+    """The motion of the pose in each pass, as frames."""
     return [frame_rows(shaken_goal(np.eye(4), shake)) for shake in SHAKES[:passes]]
 
 
 def _pencil_code(number: int, pencil: Pencil) -> str:
-    """One pencil's arrays, and the macro that initialises its struct."""
+    """The arrays of a pencil, and the macro that initialises its struct."""
     slot, ends, arrays = pencil.role.slot, pencil.ends, pencil_arrays(pencil)
     texts = [_array_code(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
@@ -186,7 +186,7 @@ def _pencil_code(number: int, pencil: Pencil) -> str:
 
 
 def _first_factor(slot: int, factors: tuple[Array, ...]) -> Array:
-    """The first factor of Q, its matrices transposed: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
+    """The first factor of Q with transposed matrices: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
     matrices = factors[0].reshape(-1, 15, 15)
     if slot == 0:
         return _pad_to_fours(matrices.swapaxes(1, 2))
@@ -194,12 +194,12 @@ def _first_factor(slot: int, factors: tuple[Array, ...]) -> Array:
 
 
 def _pad_to_fours(rows: Array) -> Array:
-    """Rows (..., k) with zeros behind, to a length that four divides."""
+    """Rows (..., k) padded with zeros to a multiple of four."""
     return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, -rows.shape[-1] % 4)])
 
 
 def _with_virtual_joint() -> str:
-    """`arm_candidates` of five joints and the tool's axis, by way of the pose that `solvers.tool_axis` makes."""
+    """`arm_candidates` of five joints and the tool's axis, through the pose of `solvers.tool_axis`."""
     inputs = [f"axis[{k} * ARM_LANES + i]" for k in range(6)]
     code = c_and_js_code.write_code(recording.record(tool_axis.pose_of, 6), inputs)
     lines = [*code.lines, *(f"goal[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
@@ -207,7 +207,7 @@ def _with_virtual_joint() -> str:
 
 
 def _with_held_joint(arm: Arm, held: Redundancy) -> str:
-    """`arm_candidates` of a whole arm whose redundant joint is held where near has it."""
+    """`arm_candidates` of an arm whose redundant joint is held at its value in near."""
     size = 12 if held.task.orientation == "full" else len(held.task.labels)
     inputs = [f"goal[{k} * ARM_LANES + i]" for k in range(size)]
     held_value = f"near[{held.joint} * ARM_LANES + i]"
@@ -220,7 +220,7 @@ def _with_held_joint(arm: Arm, held: Redundancy) -> str:
 
 
 def frame_rows(motion: ArrayLike) -> np.ndarray:
-    """The upper three rows of a motion (4, 4), flat."""
+    """The upper three rows of a motion (4, 4), as a flat array."""
     return np.asarray(motion, dtype=float)[:3].ravel()
 
 

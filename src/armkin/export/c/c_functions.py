@@ -1,7 +1,7 @@
 """Recorded formulas as C functions: candidates of a closed form, forward kinematics, Jacobian.
 
-Every function is a loop over lanes: values of pose i stand at ``[k * ARM_LANES + i]``. With one lane the loop
-is none; with more, compilers turn it into vector instructions.
+Every function is a loop over lanes, with the values of pose i at ``[k * ARM_LANES + i]``. With one lane there is no
+loop; with more lanes, compilers vectorise it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ if TYPE_CHECKING:
 def candidates_code(
     arm: Arm, task: Task, geometry: Geometry, single: bool = False, prefer: bool = True
 ) -> tuple[str, int]:
-    """`arm_candidates` of a closed form, and how many branches it has.
+    """`arm_candidates` of a closed form, and its number of branches.
 
-    prefer: joints that a target leaves free take their value from `near`; without, such a target is only in doubt, 3
-    in place of 1.
+    prefer: whether free joints take their value from `near`; otherwise a target with a free joint has doubt 3 instead
+    of 1.
     """
     n = arm.n
     declared = [(f"g{k}", f"goal[{k} * ARM_LANES + i]") for k in range(arm_formulas.goal_size(task))]
@@ -50,17 +50,17 @@ def candidates_code(
 
 
 def _preferred_inputs(arm: Arm) -> list[tuple[str, str]]:
-    """Names of what a joint that is free is set to, and what they are: a slide's `near`, of a turn cosine and sine."""
+    """Names and expressions of the values of free joints: `near` of a slide, cosine and sine of a revolute joint."""
     declared = []
-    for j in range(arm.n):
-        near = f"near[{j} * ARM_LANES + i]"
-        turns = [(f"c{j}", f"ARM_COS({near})"), (f"s{j}", f"ARM_SIN({near})")]
-        declared += [(f"p{j}", near)] if arm.prismatic[j] else turns
+    for joint in range(arm.n):
+        near = f"near[{joint} * ARM_LANES + i]"
+        cos_and_sin = [(f"c{joint}", f"ARM_COS({near})"), (f"s{joint}", f"ARM_SIN({near})")]
+        declared += [(f"p{joint}", near)] if arm.prismatic[joint] else cos_and_sin
     return declared
 
 
 def _any_true(texts: Sequence[str]) -> str:
-    """Whether one of these is true; those that never are are left out."""
+    """The expression of whether one of these is true, without those that never are."""
     return " | ".join(dict.fromkeys(text for text in texts if not text.startswith("0.0")))
 
 
@@ -80,7 +80,7 @@ def jacobian_code(arm: Arm, single: bool = False) -> str:
 
 
 def target_code(arm: Arm, task: Task, single: bool = False) -> str:
-    """`arm_goal`, the target that joint values answer."""
+    """`arm_goal`, the target that joint values reach."""
     return _recorded_code(arm_formulas.record_target(arm, task), "arm_goal", "target", single)
 
 
@@ -102,7 +102,7 @@ def _language(single: bool) -> c_and_js_code.Language:
 
 
 def _lane_loop(head: str, declared: Sequence[tuple[str, str]], lines: Sequence[str]) -> str:
-    """A function that runs the lines for every lane; inputs that they do not read are not declared."""
+    """A function that runs the lines for every lane, with declarations of the inputs that they read."""
     read = set(re.findall(r"\b[gpcsq]\d+\b", "\n".join(lines)))
     inputs = [f"const arm_real {name} = {text};" for name, text in declared if name in read]
     body = "\n".join(f"        {line}" for line in [*inputs, *lines])

@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-# What is accepted: squared residuals of a branch that is exact, that is one, that is nearly one (of the reach,
-# rad); answers closer than this are one; a matrix this far from orthonormal is no rotation.
+# thresholds of squared residuals (in reaches, rad) of exact branches, of branches, and of near solutions; distance
+# below which answers are equal; deviation of a rotation matrix from orthonormal
 _DOUBLE = {"ACCEPTED": 1e-24, "SOLUTION": 1e-18, "NEARBY": 1e-12, "SAME": 1e-6, "ROTATION": 5e-6, "LARGEST": MAX_TARGET}
 _SINGLE = {"ACCEPTED": 1e-10, "SOLUTION": 1e-9, "NEARBY": 1e-6, "SAME": 1e-3, "ROTATION": 1e-3, "LARGEST": 1e9}
 
@@ -46,29 +46,29 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form in C.
     """
-    turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
-    method = _method_of(turned, task_name)
+    actual = actual_arm(arm)  # branches and limits are in actual joint values
+    method = _method_of(actual, task_name)
     task, geometry = method.task, method.geometry
-    candidates, branches = candidates_code(turned, task, geometry, single, held=method.held)
+    candidates, branches = candidates_code(actual, task, geometry, single, held=method.held)
     prefix = identifier(arm.name)
     units = ["mm" if slides else "rad" for slides in arm.prismatic]
     joints = ", ".join(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, units, strict=True))
-    words = {  # what people have named, as they have: a source may be called arm_ik.c
+    user_texts = {  # texts chosen by users stay as they are, even if a source is called arm_ik.c
         "about": _about_text(arm, task, geometry, single),
         "stem": Path(file).stem,
         "joints_are": comment_text(joints),
     }
-    fields = _fields(arm, task, geometry, branches, single) | {name: f"@{name}@" for name in words}
+    fields = _fields(arm, task, geometry, branches, single) | {name: f"@{name}@" for name in user_texts}
     source = _source_text(arm, task, candidates, single)
     test = golden_test(arm, task, part_text("test"), single, method.numbered)
     texts = (part_text("header"), source, test)
-    return Program(*(fill_fields(_prefix_names(fill_fields(text, fields), prefix), words) for text in texts))
+    return Program(*(fill_fields(_prefix_names(fill_fields(text, fields), prefix), user_texts) for text in texts))
 
 
 def _fields(arm: Arm, task: Task, geometry: Geometry, branches: int, single: bool) -> dict[str, str]:
-    """Texts of the @names@ in the fixed parts, but for those that people have named."""
-    turned = actual_arm(arm)
-    names = branch_names(turned, task, geometry, branches)
+    """Texts of the @names@ in the fixed parts, except those chosen by users."""
+    actual = actual_arm(arm)
+    names = branch_names(actual, task, geometry, branches)
     other_held_values = part_text("other_held_values").replace("@reach@", number_text(arm.reach, single))
     return {
         "keep_outs": keep_out_tables.declarations(arm) if arm.keep_out else "",
@@ -86,15 +86,15 @@ def _fields(arm: Arm, task: Task, geometry: Geometry, branches: int, single: boo
         "orientation": _orientation_lines(arm, task, single),
         "most": "arm_most(target)" if task.orientation == "full" else "ARM_SOLUTION",
         "other_held_values": other_held_values if geometry.pairs is not None else "",
-        "lower": _number_list(turned.lower, single),
-        "upper": _number_list(turned.upper, single),
+        "lower": _number_list(actual.lower, single),
+        "upper": _number_list(actual.upper, single),
         **_ratio_lines(arm, single),
         "slides": ", ".join(str(int(p)) for p in arm.prismatic),
     }
 
 
 def _source_text(arm: Arm, task: Task, candidates: str, single: bool) -> str:
-    """The source, its @names@ not filled in; candidates: the function `arm_candidates`."""
+    """The source before its @names@ are filled in; candidates: the function `arm_candidates`."""
     parts = [
         part_text("source_head"),
         part_text("numbers_float" if single else "numbers_double"),
@@ -113,24 +113,24 @@ def _source_text(arm: Arm, task: Task, candidates: str, single: bool) -> str:
 
 
 class _Method(NamedTuple):
-    """How an arm's targets are solved in C."""
+    """The method that solves the targets of an arm in C."""
 
     task: Task
-    geometry: Geometry  # the class; of an arm with a redundant joint that of the others, that joint where near has it
+    geometry: Geometry  # the class; with a redundant joint, the class of the others with that joint held by near
     held: Redundancy | None  # the redundant joint
-    numbered: bool  # whether branches have the numbers that Python gives them
+    numbered: bool  # whether branches have the same numbers as in Python
 
 
 def _method_of(arm: Arm, task_name: str | None) -> _Method:
-    """The method of an arm's class; UsageError if the task does not fit the arm."""
-    spare = redundancy(arm, task_name)
-    if spare is None:
-        task, named = solver(arm, task_name)
-        geometry = plain_form(arm, task, named)
-        return _Method(task, geometry, held=None, numbered=geometry is named)
-    geometry = plain_form(spare.rest, spare.task, spare.geometry)
-    held = spare._replace(geometry=geometry)
-    return _Method(spare.task, held_by_near(arm, held), held, numbered=geometry is spare.geometry)
+    """The method for the class of an arm; UsageError if the task does not fit the arm."""
+    redundant = redundancy(arm, task_name)
+    if redundant is None:
+        task, recognised = solver(arm, task_name)
+        geometry = plain_form(arm, task, recognised)
+        return _Method(task, geometry, held=None, numbered=geometry is recognised)
+    geometry = plain_form(redundant.rest, redundant.task, redundant.geometry)
+    held = redundant._replace(geometry=geometry)
+    return _Method(redundant.task, held_by_near(arm, held), held, numbered=geometry is redundant.geometry)
 
 
 def candidates_code(
@@ -142,10 +142,10 @@ def candidates_code(
     lanes: str = "",
     held: Redundancy | None = None,
 ) -> tuple[str, int]:
-    """The function `arm_candidates` of an arm's class, and how many branches it has.
+    """The function `arm_candidates` for the class of an arm, and its number of branches.
 
-    lanes, held: see `c_elimination.candidates_code`; a closed form has the held joint in
-    it. Raises UsageError if the class has no form in C, or none in single precision.
+    lanes, held: see `c_elimination.candidates_code`; closed forms contain the held joint.
+    Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
         return c_functions.candidates_code(arm, task, geometry, single, prefer)
@@ -162,7 +162,7 @@ def candidates_code(
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
-    """The class itself; for an arm off its class that the elimination solves, the elimination: branches by number."""
+    """The class itself, or the elimination if the class has no form in C but the elimination solves the arm."""
     if has_form(geometry) or not geometry.complete or task.name != "pose" or arm.n != 6:
         return geometry
     elimination = general.recognise(arm, task)
@@ -170,7 +170,7 @@ def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
 
 
 def why_no_form(arm: Arm, geometry: Geometry) -> str:
-    """Why a class of arms cannot be written in C."""
+    """The reason why a class of arms cannot be written in C."""
     if geometry.elimination is None and geometry.name.startswith("near "):
         return "its branches are corrected ones of the class that it nearly fits, as many rounds as each needs"
     if geometry.elimination is None:
@@ -187,15 +187,15 @@ def has_form(geometry: Geometry) -> bool:
 
 
 def settings(single: bool = False) -> str:
-    """The constants that the fixed parts read."""
-    values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be one
+    """The constants of the fixed parts."""
+    values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be equal
     values |= {"ROUNDED": ROUNDED, "DECIMAL": DECIMAL, "FLOAT": FLOAT32}
     lines = [f"#define ARM_{name} {number_text(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])
 
 
 def target_size(task: Task) -> int:
-    """Numbers of a target as people give it."""
+    """Number of values of a target as given by users."""
     return 16 if task.orientation == "full" else len(task.labels)
 
 
@@ -215,13 +215,13 @@ def fill_fields(text: str, fields: dict[str, str]) -> str:
 
 
 def _prefix_names(text: str, prefix: str) -> str:
-    """Public names begin with the robot's, so that two arms fit into one program."""
+    """The text with the robot's name in public names, so that a program can contain two arms."""
     text = re.sub(r"\barm_(fk|jacobian|target|ik|best|names|real|solution|free|pairs)\b", rf"{prefix}_\1", text)
     return re.sub(r"\bARM_(JOINTS|BRANCHES|TARGET)\b", rf"{prefix.upper()}_\1", text)
 
 
 def _ratio_lines(arm: Arm, single: bool) -> dict[str, str]:
-    """Lines that turn `near` into actual joint values and a branch into commanded ones, for calibrated arms."""
+    """Lines that convert `near` to actual joint values and branches to commanded ones, for calibrated arms."""
     if (arm.ratio == 1.0).all():
         return {"actual_near": "", "commanded": "", "close": ""}
     table = f"static const arm_real ratio[ARM_JOINTS] = {{{_number_list(arm.ratio, single)}}};"
@@ -243,9 +243,9 @@ def _ratio_lines(arm: Arm, single: bool) -> dict[str, str]:
 
 
 def _orientation_lines(arm: Arm, task: Task, single: bool) -> str:
-    """Lines that add to `sum` what joint values q miss beside the position."""
+    """Lines that add the residual of the orientation at joint values q to `sum`."""
     lines = []
-    if task.orientation == "full":  # half the Frobenius norm, which is the angle
+    if task.orientation == "full":  # half the squared Frobenius norm approximates the squared angle
         lines = [
             "for (i = 0; i < 9; i++) {",
             "    off = T[4 * (i % 3) + i / 3] - goal[i];",
@@ -279,7 +279,7 @@ def _about_text(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:
 
 
 def comment_text(text: str) -> str:
-    """A line as a comment of C may hold it: none begins or ends in it, and no trigraph stands there.
+    """A line that is safe in a C comment: without comment marks and trigraphs.
 
     >>> comment_text("reach 2*/3")
     'reach 2* /3'

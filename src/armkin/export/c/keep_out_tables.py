@@ -1,4 +1,4 @@
-"""Keep-outs in C: the arm's segments as a formula, tables of what they are held against, and the loops over both."""
+"""Keep-outs in C: a formula of the arm's segments, tables of pairs and obstacles, and the loops over both."""
 
 from __future__ import annotations
 
@@ -21,55 +21,55 @@ _NUMBERS = 15  # numbers of the largest shape
 
 
 class Tables(NamedTuple):
-    """What is held against what."""
+    """The tables of segments, obstacles and pairs."""
 
     thick: list[float]  # radius of each segment [mm]
-    solid: int  # bodies that are held against obstacles
-    moving: list[tuple[int, int]]  # a segment, and its body's place among those
-    shapes: list[tuple[int, list[float]]]  # number of each obstacle's kind, and its numbers
-    crossings: list[tuple[int, int, int]]  # a segment, another, and their pair
-    pairs: list[tuple[str, str]]  # names: a body, and what it is held against
+    solid: int  # number of bodies that may hit obstacles
+    moving: list[tuple[int, int]]  # a segment, and the index of its body among those
+    shapes: list[tuple[int, list[float]]]  # kind of each obstacle, and its numbers
+    crossings: list[tuple[int, int, int]]  # two segments, and the index of their pair
+    pairs: list[tuple[str, str]]  # names of a body and of the other body or obstacle
 
 
 def pair_tables(arm: Arm) -> Tables:
-    """The pairs of an arm with keep-outs: an obstacle with each body that moves, then bodies with each other."""
-    held = guard(arm)
-    form = held.bodies
-    solid = sorted({int(form.owner[k]) for k in held.moving})
+    """The tables of an arm with keep-outs: pairs of obstacles and moving bodies, then pairs of bodies."""
+    arm_guard = guard(arm)
+    arm_bodies = arm_guard.bodies
+    solid = sorted({int(arm_bodies.owner[k]) for k in arm_guard.moving})
     shapes = []
-    for _, obstacle in held.obstacles:
+    for _, obstacle in arm_guard.obstacles:
         kind, values = obstacle.c_function()
         shapes.append((_KINDS[kind], list(map(float, values))))
-    pair_of_crossing = np.searchsorted(held.starts, np.arange(len(held.ours)), side="right") - 1
+    pair_of_crossing = np.searchsorted(arm_guard.starts, np.arange(len(arm_guard.ours)), side="right") - 1
     pair_of_crossing += len(shapes) * len(solid)  # pairs of a body and an obstacle are numbered first
     return Tables(
-        thick=form.radius[form.owner].tolist(),
+        thick=arm_bodies.radius[arm_bodies.owner].tolist(),
         solid=len(solid),
-        moving=[(int(k), solid.index(int(form.owner[k]))) for k in held.moving],
+        moving=[(int(k), solid.index(int(arm_bodies.owner[k]))) for k in arm_guard.moving],
         shapes=shapes,
-        crossings=list(zip(held.ours.tolist(), held.theirs.tolist(), pair_of_crossing.tolist(), strict=True)),
-        pairs=[held.pair_names(k) for k in range(len(held.pairs))],
+        crossings=list(zip(arm_guard.ours.tolist(), arm_guard.theirs.tolist(), pair_of_crossing.tolist(), strict=True)),
+        pairs=[arm_guard.pair_names(k) for k in range(len(arm_guard.pairs))],
     )
 
 
 def clearances_code(arm: Arm, single: bool = False) -> str:
-    """`arm_least`, of the segments' ends that `arm_ends` gives: least clearance and the pair it is of."""
-    held = pair_tables(arm)
+    """`arm_least`, the least clearance and its pair for the ends of segments from `arm_ends`."""
+    tables = pair_tables(arm)
 
     def initialiser(values: Iterable[float]) -> str:
         return ", ".join(number_text(float(v), single) for v in values)
 
-    rows = [initialiser([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in held.shapes]
-    crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in held.crossings]
+    rows = [initialiser([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in tables.shapes]
+    crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in tables.crossings]
     fields = {
-        "segments": str(len(held.thick)),
-        "moving_count": str(len(held.moving)),
-        "obstacle_count": str(len(held.shapes)),
+        "segments": str(len(tables.thick)),
+        "moving_count": str(len(tables.moving)),
+        "obstacle_count": str(len(tables.shapes)),
         "crossing_count": str(len(crossings)),
-        "solid": str(held.solid),
-        "thick": initialiser(held.thick),
-        "moving": ", ".join(str(k) for pair in held.moving for k in pair) or "0",
-        "kinds": ", ".join(str(kind) for kind, _ in held.shapes) or "0",
+        "solid": str(tables.solid),
+        "thick": initialiser(tables.thick),
+        "moving": ", ".join(str(k) for pair in tables.moving for k in pair) or "0",
+        "kinds": ", ".join(str(kind) for kind, _ in tables.shapes) or "0",
         "obstacles": ",\n    ".join(f"{{{row}}}" for row in rows) or "{0}",
         "crossings": ", ".join(crossings) or "{0}",
         "clearance": number_text(arm.clearance, single),
@@ -88,7 +88,7 @@ def free_code(arm: Arm) -> str:
 
 
 def _quoted_name(name: str) -> str:
-    """A name as text of C holds it."""
+    """A name escaped for a C string."""
     plain = name.encode("ascii", "replace").decode()
     return plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "?\\?")
 

@@ -1,4 +1,4 @@
-"""Parts in C that are the same for all arms."""
+"""Parts of the C source that are the same for all arms."""
 
 from pathlib import Path
 
@@ -6,5 +6,5 @@ PARTS = Path(__file__).parent / "parts"
 
 
 def part_text(name: str) -> str:
-    """A part's text, with @names@ to be filled in."""
+    """The text of a part, with @names@ to be filled in."""
     return (PARTS / f"{name}.c").read_text(encoding="utf-8")

@@ -1,4 +1,4 @@
-"""The ES module of an arm: every branch in a browser or in node, in double precision."""
+"""Writes the ES module of an arm, which computes all branches in a browser or in node, in double precision."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 _PARTS = Path(__file__).parent / "parts"
-_ONE_COPY = 1e-6  # distance [rad] from half a turn from which on a limit leaves one copy of a value
-_ROUNDED = 5e-6  # distance from orthonormal, at most, of a pose of six printed digits
+_ONE_COPY = 1e-6  # distance [rad] of limits from half a turn above which a value has only one legal copy
+_ROUNDED = 5e-6  # largest deviation from orthonormal of a pose with six printed digits
 _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: string[], method: string,
  *   slides: boolean[], lower: number[], upper: number[], home: number[], ratio: number[], unit: number[],
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
@@ -45,34 +45,34 @@ _SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "su
 
 
 def module_text(arm: Arm, task_name: str | None = None) -> str:
-    """An arm as the text of an ES module: names, limits, home, fk, jacobian, target, ik, pulses, joints.
+    """The text of an ES module of an arm, with names, limits, home, fk, jacobian, target, ik, pulses, joints.
 
     Raises UsageError if the task does not fit the arm, or if the arm's class has no form without Python.
     """
-    if spare := redundancy(actual_arm(arm), task_name):
-        return _module_with_one_held(arm, actual_arm(arm), spare)
+    if redundant := redundancy(actual_arm(arm), task_name):
+        return _module_with_one_held(arm, actual_arm(arm), redundant)
     return _module_of_all(arm, task_name, driven=not motors.undriven_joints(arm))
 
 
 def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
-    """The module's text: data, kinematics, keep-outs, solver, and pulses if driven. UsageError: it has no form."""
-    turned = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
-    task, named = solver(turned, task_name)
-    geometry = plain_form(turned, task, named)
+    """The text with data, kinematics, keep-outs, solver, and pulses if driven; UsageError without a form."""
+    actual = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
+    task, recognised = solver(actual, task_name)
+    geometry = plain_form(actual, task, recognised)
     if not has_form(geometry):
         raise UsageError(
             f"{arm.name}: {geometry.name} has no form in JavaScript: {why_no_form(arm, geometry)}; task {task.name} is "
             "solved in Python alone"
         )
-    solve, branches = candidates_code(turned, task, geometry)
+    solve, branches = candidates_code(actual, task, geometry)
     parts = [
         f"// {_about_text(arm, task, geometry)}",
         part_text("head"),
         *_exported_lines(arm, task),
-        *_data_lines(arm, turned, task, geometry, branches, driven),
-        *_kinematics(turned, task),
-        *_keep_outs(arm, turned),
-        _by_joint(turned, calibrated=bool((arm.ratio != 1.0).any())),
+        *_data_lines(arm, actual, task, geometry, branches, driven),
+        *_kinematics(actual, task),
+        *_keep_outs(arm, actual),
+        _by_joint(actual, calibrated=bool((arm.ratio != 1.0).any())),
         *map(part_text, _SOLVER),
         *(map(part_text, js_elimination.METHOD) if geometry.pairs is None else ()),
         solve,
@@ -83,32 +83,32 @@ def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
     return "\n".join(parts)
 
 
-def _module_with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
-    """The module of an arm with one joint to spare: the redundant joint is held, the module of the others solves."""
-    name, task = arm.joint_names[spare.joint], spare.task
-    plain = turned is arm and not arm.keep_out  # then it is prepared already
-    other_joints = spare.rest if plain else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
+def _module_with_one_held(arm: Arm, actual: Arm, redundant_joint: Redundancy) -> str:
+    """The module of an arm with a redundant joint, which is held while an inner module solves the others."""
+    name, task = arm.joint_names[redundant_joint.joint], redundant_joint.task
+    is_unchanged = actual is arm and not arm.keep_out  # then the solver is prepared already
+    other_joints = redundant_joint.rest if is_unchanged else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
     inner = _module_of_all(other_joints, task.name, driven=False).replace(part_text("head"), "")
     inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
-    way = arm.link[-1] if spare.joint else inverse(arm.link[0])
+    link = arm.link[-1] if redundant_joint.joint else inverse(arm.link[0])
     driven = not motors.undriven_joints(arm)
     redundant = {
-        "joint": spare.joint,
-        "before": inverse(way).ravel().tolist(),
-        "after": way.ravel().tolist(),
+        "joint": redundant_joint.joint,
+        "before": inverse(link).ravel().tolist(),
+        "after": link.ravel().tolist(),
         "sums": task.sums[:, 0].tolist(),
     }
     parts = [
-        f"// {_about_text(arm, task, spare.geometry)} while {name} is held",
+        f"// {_about_text(arm, task, redundant_joint.geometry)} while {name} is held",
         part_text("head"),
         *_exported_lines(arm, task),
         "/** The joint that the target leaves free: `ik` holds it. */",
         f"export const redundant = {_js_text(name)};",
-        *_data_lines(arm, turned, task, spare.geometry, 0, driven),
+        *_data_lines(arm, actual, task, redundant_joint.geometry, 0, driven),
         f"const REDUNDANT = {_js_text(redundant)};",
         f"const OTHERS = (() => {{\n{inner}return {{ ik, branch_names }};\n}})();",
-        *_kinematics(turned, task),
-        *_keep_outs(arm, turned),
+        *_kinematics(actual, task),
+        *_keep_outs(arm, actual),
         part_text("poses"),
         part_text("redundant").replace("@TARGET@", _target_text(task)),
         *([part_text("pulses")] if driven else []),
@@ -117,12 +117,12 @@ def _module_with_one_held(arm: Arm, turned: Arm, spare: Redundancy) -> str:
 
 
 def part_text(name: str) -> str:
-    """A part's text."""
+    """The text of a part."""
     return (_PARTS / f"{name}.js").read_text(encoding="utf-8")
 
 
 def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
-    """The function `candidates` of an arm's class, and how many branches it has."""
+    """The function `candidates` for the class of an arm, and its number of branches."""
     if geometry.pairs is None:
         return js_elimination.elimination_code(arm, task, geometry.elimination), js_elimination.BRANCHES
     goal = {f"g{k}": f"goal[{k}]" for k in range(arm_formulas.goal_size(task))}
@@ -147,13 +147,13 @@ def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]
 
 
 def _preferred_inputs(arm: Arm) -> Iterator[str]:
-    """What a joint that is free is set to: a slide's `near`, of a turn cosine and sine; computed where it is read."""
+    """Expressions of the values of free joints: `near` of a slide, cosine and sine of a revolute joint."""
     for j in range(arm.n):
         yield from [f"near[{j}]"] if arm.prismatic[j] else [f"Math.cos(near[{j}])", f"Math.sin(near[{j}])"]
 
 
 def _joint_function(name: str, recorded: recording.Recording) -> str:
-    """A function that writes a recording's outputs for joint values q into an array."""
+    """A function that writes the outputs of a recording for joint values q into an array."""
     inputs = [f"q{j}" for j in range(len(recorded.inputs))]
     code = c_and_js_code.write_code(recorded, inputs, c_and_js_code.JAVASCRIPT)
     lines = [f"const {q} = q[{j}];" for j, q in enumerate(inputs)]
@@ -176,7 +176,7 @@ def _kinematics(turned: Arm, task: Task) -> list[str]:
 
 
 def _exported_lines(arm: Arm, task: Task) -> list[str]:
-    """The module's constants: names, limits, home, labels."""
+    """The exported constants: names, limits, home, labels."""
     limits = [[None if np.isinf(v) else v for v in row] for row in np.stack([arm.lower, arm.upper], axis=1).tolist()]
     return [
         "/** The joints. */",
@@ -191,7 +191,7 @@ def _exported_lines(arm: Arm, task: Task) -> list[str]:
 
 
 def _data_lines(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, driven: bool) -> list[str]:
-    """What the parts read of the arm."""
+    """The data of the arm that the parts read."""
     fields: dict[str, Any] = {
         "name": arm.name,
         "joints": arm.n,
@@ -226,7 +226,7 @@ def _data_lines(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches:
 
 
 def _by_joint(arm: Arm, *, calibrated: bool) -> str:
-    """A candidate's joint values and their legal copies, a line a joint: loops over constants take twice as long."""
+    """The joint values of a candidate and their legal copies, without loops, which would take twice as long."""
     n = arm.n
     values = ", ".join(f"allJoints[{n} * b + {j}]" for j in range(n))
     head = "/** Joint values of a candidate. @param {number} b @returns {number[]} */\nfunction candidate(b)"
@@ -249,7 +249,7 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
 
 
 def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
-    """The lines that take joint j to its nearest legal copy, and count its motion."""
+    """The lines that move joint j to its nearest legal copy, and add up its motion."""
     low, high, slides = float(arm.lower[j]), float(arm.upper[j]), bool(arm.prismatic[j])
     tests = [f"value >= {low!r} - SLACK"] if np.isfinite(low) else []
     tests += [f"value <= {high!r} + SLACK"] if np.isfinite(high) else []
@@ -258,7 +258,7 @@ def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
     if slides:
         return [f"value = q[{j}];", *check, f"slid += {change};"]
     copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_js_text(low)}, {_js_text(high)}, {_js_text(slides)});"
-    if low > -np.pi + _ONE_COPY and high < np.pi - _ONE_COPY:  # there is one copy, wherever `near` is
+    if low > -np.pi + _ONE_COPY and high < np.pi - _ONE_COPY:  # only one copy is legal, whatever `near` is
         nearest = ["if (!(Math.abs(value) < Math.PI - SLACK)) {", copy, "}", *check]
     else:
         usual = " && ".join([f"Math.abs(value - near[{j}]) < Math.PI - SLACK", *tests])
@@ -267,7 +267,7 @@ def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
 
 
 def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
-    """What the arm must not touch, and how far it is from that; a robot file may have none."""
+    """The tables of keep-outs, and the function of clearances; empty ones without keep-outs."""
     if not arm.keep_out:
         return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => any} */", "const hitsOf = () => ({});"]
     held = pair_tables(turned)
@@ -288,7 +288,7 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
 
 
 def _js_text(value: Any) -> str:
-    """A value as JavaScript: JSON, and infinity; no text in it ends a script element or a line."""
+    """A value as JavaScript (JSON and infinity), escaped so that it ends neither a script element nor a line."""
     escaped = {"<": "\\u003c", "\u2028": "\\u2028", "\u2029": "\\u2029"}
     text = json.dumps(value, ensure_ascii=False)
     for letter, code in escaped.items():

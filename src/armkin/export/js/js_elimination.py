@@ -1,6 +1,6 @@
-"""The general elimination as JavaScript: the method is the same for all arms, its constants are data.
+"""The general elimination as JavaScript: the method is the same for all arms, and its constants are data.
 
-See `armkin.inverse.elimination.method` for the method and why it is complete.
+`armkin.inverse.elimination.method` explains the method and why it is complete.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ METHOD = ("eigenvalues", "frames", "roots", "equal_roots", "elimination")
 
 
 def elimination_code(arm: Arm, task: Task, elimination: Elimination) -> str:
-    """The constants of an arm that the elimination solves, and its `candidates`; `METHOD` has the functions."""
+    """The constants of an arm that the elimination solves, and its function `candidates`, which calls `METHOD`."""
     kinds = plans_of(elimination, len(SHAKES))
     pencils, plans = pencils_of(kinds)
     loop = elimination.loop
@@ -57,16 +57,16 @@ def elimination_code(arm: Arm, task: Task, elimination: Elimination) -> str:
         "function candidates(goal, near, q, miss, passes) {"
     )
     pose = "goal"
-    if task.orientation == "axis":  # solved by way of a pose with that z axis and a joint more
-        made = recording.record(tool_axis.pose_of, 6)
-        code = c_and_js_code.write_code(made, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
+    if task.orientation == "axis":  # solved through a pose with that z axis and an additional joint
+        recorded = recording.record(tool_axis.pose_of, 6)
+        code = c_and_js_code.write_code(recorded, [f"goal[{k}]" for k in range(6)], c_and_js_code.JAVASCRIPT)
         head = "\n".join([head, *(f"  {line}" for line in code.lines)])
         pose = f"[{', '.join(text[0] for text in code.outputs)}]"
     return "\n".join([*lines, head, f"  return candidatesOfPose({pose}, near, q, miss, passes);", "}", ""])
 
 
 def _pencil_code(pencil: Pencil) -> str:
-    """One pencil as a JavaScript object."""
+    """A pencil as a JavaScript object."""
     role = pencil.role
     fields = {
         "psi": repr(float(pencil.psi)),
