@@ -1,7 +1,7 @@
-"""`armkin.ik`: from targets to all branches within limits.
+"""`armkin.ik`: computes all branches of targets, and which of them are within limits.
 
-The way of a target: task -> geometry -> candidate branches -> residual of each, through the
-forward kinematics -> whole turns and limits -> the few doubted ones through `doubted`.
+Steps for a target: task -> geometry -> candidate branches -> their residuals by the forward
+kinematics -> whole turns and limits -> examination of the few targets in doubt.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
 from armkin.model.arm import Arm, actual_arm
 
-THREAD_POSES = 256  # poses of an elimination that are worth a thread; a thread's own chunks have as many
+THREAD_POSES = 256  # fewest poses of an elimination for a thread, and size of its chunks
 
 
 def ik(
@@ -84,14 +84,14 @@ def ik(
         check_workers(workers)
     free = redundancy(arm, task)
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
-    plain = rounding is None and not (single or position_first) and examine and free is None
-    if plain and (values.ndim == 1 or values.shape == (4, 4)):  # a batch prepares nothing for one
-        way = one_target.short_way(arm, task)
-        if way is not None and (alone := way.solve(values, near)) is not None:
-            return alone
+    is_simple = rounding is None and not (single or position_first) and examine and free is None
+    if is_simple and (values.ndim == 1 or values.shape == (4, 4)):  # a batch prepares nothing for one
+        single_solver = one_target.short_way(arm, task)
+        if single_solver is not None and (solutions := single_solver.solve(values, near)) is not None:
+            return solutions
     if (turned := actual_arm(arm)) is not arm:
-        more: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
-        s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **more)
+        options: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
+        s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **options)
         return _as_commanded(arm, s)
     if position_first:
         return minima(ik, arm, task, targets, near)
@@ -100,7 +100,7 @@ def ik(
     return solve_by(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 
-def solve_by(  # noqa: C901 - what is looked at after the closed form, in its order
+def solve_by(  # noqa: C901 - the examinations after the closed form, in their order
     arm: Arm,
     task: Task,
     geometry: Geometry,
@@ -111,29 +111,29 @@ def solve_by(  # noqa: C901 - what is looked at after the closed form, in its or
     workers: int = 1,
     rounding: ArrayLike | None = None,
 ) -> Solutions:
-    """`ik` by a solver, of an arm whose joints move as they are commanded; single: whether the targets were given in
+    """`ik` by a given solver, for an arm with ratios of 1; single: whether the targets were given in
     float32."""
-    targets, lead = flat_targets(task, values)
-    reference = read_near(arm, near, lead)
+    targets, batch_shape = flat_targets(task, values)
+    reference = read_near(arm, near, batch_shape)
     is_shared = reference.ndim == 1 and len(targets) != 1
     nears = np.broadcast_to(reference, (len(targets), arm.n)) if is_shared else reference.reshape(-1, arm.n)
     common = reference if reference.ndim == 1 else None
     if geometry.pairs:
-        batch, count, target, shown, left = chunks.solve(arm, task, geometry, targets, nears, common, examine, workers)
-        if len(left):
-            batch = _by_slower_class(Goals(arm, task, target, nears), geometry.doubts, batch, left, examine, workers)
+        batch, count, target, shown, rows = chunks.solve(arm, task, geometry, targets, nears, common, examine, workers)
+        if len(rows):
+            batch = _by_slower_class(Goals(arm, task, target, nears), geometry.doubts, batch, rows, examine, workers)
     else:
         target, _, shown = read_targets(task, values)
-        target = target.copy() if np.may_share_memory(target, values) else target  # the caller's arrays may change
+        target = target.copy() if np.may_share_memory(target, values) else target  # the caller may change its arrays
         batch, count = _row_by_row(Goals(arm, task, target, nears), geometry, examine, workers)
-    shown, most = target_rounding.of_targets(arm, task, target, (targets, shown), single, rounding, lead)
+    shown, thresholds = target_rounding.of_targets(arm, task, target, (targets, shown), single, rounding, batch_shape)
     goals = Goals(arm, task, target, nears)
     if examine:
         edge = np.flatnonzero((batch.status == Status.BOUNDARY) | (batch.status == Status.SINGULAR))
         if len(illegal := edge[~batch.within[edge].any(axis=1)]):
             batch = legal_postures.with_legal_postures(goals, batch, illegal)
-        if most.max(initial=0.0) > near_itself.ROUNDED:
-            batch = near_itself.stand(goals, batch, most)
+        if thresholds.max(initial=0.0) > near_itself.ROUNDED:
+            batch = near_itself.stand(goals, batch, thresholds)
         if arm.keep_out:
             batch = legal_postures.with_free_postures(goals, batch)
     if arm.prismatic.any():
@@ -142,16 +142,16 @@ def solve_by(  # noqa: C901 - what is looked at after the closed form, in its or
         batch.branch[...] = follow_branches(arm, task, batch.q, target)
     names = branch_names(arm, task, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
-    return as_solutions(goals, reference, lead, batch, shown, (names, geometry.name, geometry.why))
+    return as_solutions(goals, reference, batch_shape, batch, shown, (names, geometry.name, geometry.why))
 
 
 def columns(
     arm: Arm, targets: Array, task: str | None = None, *, kept: bool = False
 ) -> Iterator[chunks.Columns] | None:
-    """Branches of targets (N, m) or (N, 4, 4) in columns, part by part, for those who count them and list none.
+    """Branches of targets (N, m) or (N, 4, 4) as columns in parts, for callers that only count them.
 
-    None for an arm without a closed form, or whose joints move by ratios. kept: whether the arrays of a part stay when
-    the next one is asked for. Raises RedundantArmError where the answers of a target are curves.
+    None for an arm without a closed form, or with other ratios than 1. kept: whether the arrays of a part stay valid
+    after the next part is computed. Raises RedundantArmError where the answers of a target are curves.
     """
     definition, geometry = solver(arm, task)
     if geometry.pairs is None or actual_arm(arm) is not arm:
@@ -160,41 +160,41 @@ def columns(
 
 
 def isolated_branches(arm: Arm, targets: ArrayLike, task: str | None = None, **more: Any) -> Solutions:
-    """`ik` for those who follow single branches: raises RedundantArmError where the answers of a target are curves."""
+    """`ik` for following single branches; raises RedundantArmError if the answers of a target are curves."""
     solver(actual_arm(arm), task)
     return ik(arm, targets, task, **more)
 
 
 def _actual_near(arm: Arm, near: ArrayLike | None) -> Array | None:
-    """Commanded values as actual ones; what has a wrong shape is left for `ik` to refuse."""
+    """Actual joint values of commanded ones; values of a wrong shape stay unchanged, so that `ik` refuses them."""
     reference = None if near is None else arrays.real_array(near, "near")
     return reference * arm.ratio if reference is not None and reference.shape[-1:] == (arm.n,) else reference
 
 
 def _as_commanded(arm: Arm, solved: Solutions) -> Solutions:
-    """Solutions in actual joint values as those in commanded ones."""
+    """Solutions in commanded joint values, from those in actual ones."""
     near, interval, task = solved.near / arm.ratio, solved.interval, solved.task.name
-    if interval is not None and (free := redundancy(arm, task)) is not None:
-        interval = np.sort(interval / arm.ratio[free.joint], axis=-1)
+    if interval is not None and (redundant := redundancy(arm, task)) is not None:
+        interval = np.sort(interval / arm.ratio[redundant.joint], axis=-1)
     return replace(solved, arm=arm, task=task_for(arm, task), near=near, q=solved.q / arm.ratio, interval=interval)
 
 
 def _by_slower_class(
-    goals: Goals, geometry: Geometry | None, batch: Batch, left: Int, examine: bool, workers: int
+    goals: Goals, geometry: Geometry | None, batch: Batch, doubted: Int, examine: bool, workers: int
 ) -> Batch:
-    """The batch with what a closed form leaves in doubt solved the other way that it names."""
+    """The batch after solving targets in doubt by the slower class that the closed form names."""
     assert geometry is not None
-    part = arm, task, target, near = goals.of(left)
+    part = arm, task, target, near = goals.of(doubted)
     if not geometry.pairs:
-        return replace_rows(batch, left, _row_by_row(part, geometry, examine, workers)[0])
-    solved, _, target, _, more = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
-    if len(more):
-        solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, more, examine, workers)
-    return replace_rows(batch, left, solved)
+        return replace_rows(batch, doubted, _row_by_row(part, geometry, examine, workers)[0])
+    solved, _, target, _, rest = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
+    if len(rest):
+        solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, rest, examine, workers)
+    return replace_rows(batch, doubted, solved)
 
 
 def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -> tuple[Batch, int]:
-    """Solvers that return joint values row by row. Also the number of branch columns."""
+    """The batch of a solver that returns joint values by rows, and its number of branch columns."""
     assert geometry.rows is not None
     arm, task, target, near = goals
     solve = (geometry.unmoved if examine else None) or geometry.rows
@@ -202,9 +202,9 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     q, doubt, complete, lost, guesses = stack_rows(parts)
     B = q.shape[1]
     batch = empty_batch(len(target), B, arm.n)
-    batch.q[...], inside = nearest_row(arm, q, near[:, None, :])
+    batch.q[...], is_within = nearest_row(arm, q, near[:, None, :])
     batch.valid[...] = ~np.isnan(q).any(axis=2)
-    batch.within[...] = inside & batch.valid
+    batch.within[...] = is_within & batch.valid
     batch.branch[...] = np.where(batch.valid, np.arange(B), -1)
     batch.complete[...] = complete
     count = batch.valid.sum(axis=1)
@@ -219,17 +219,17 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
         seeds = Seeds.of(candidates, np.arange(candidates.shape[1]) % max(B, 1))
 
         def others(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
-            """Branches of targets around these, on both sides: what two roots in one leave is real on one of them.
+            """Branches of targets around these on both sides, as two merged roots become real on one of the sides.
 
-            They say nothing of an end of the workspace, beside which no target is reached, and of self-motions.
+            Such branches give no information about self-motions and about ends of the workspace.
             """
             candidates = solve(targets_around(arm, task, target).reshape(-1, *target.shape[1:])).q
             candidates = candidates.reshape(len(target), -1, arm.n)
             return candidates, np.arange(candidates.shape[1]) % max(B, 1), lost
 
-        unsettled = np.zeros(len(target), bool) if lost is None else lost
-        batch = examine_targets(goals, batch, doubted, seeds, others, unsettled)
-        order = projection(arm.prismatic, batch.q[doubted]).argsort(axis=1)  # one order, whatever was found first
+        is_unsettled = np.zeros(len(target), bool) if lost is None else lost
+        batch = examine_targets(goals, batch, doubted, seeds, others, is_unsettled)
+        order = projection(arm.prismatic, batch.q[doubted]).argsort(axis=1)  # independent of the search
         for array in (batch.q, batch.valid, batch.within, batch.branch):
             table = array[doubted]
             array[doubted] = np.take_along_axis(table, order.reshape(order.shape + (1,) * (table.ndim - 2)), axis=1)
