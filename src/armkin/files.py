@@ -1,4 +1,4 @@
-"""Files that appear whole or not at all, and never in place of a robot file or of what was read."""
+"""Writes files completely or not at all, and never over a robot file or a file that the command reads."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ _APPEND = {"w": "a", "wb": "ab"}
 
 
 _ROBOT = rb"(?m)^convention[ \t]*:", rb"(?m)^joints[ \t]*:"
-_DATA = (".csv", ".jsonl", ".npz", ".parquet")  # table endings: before another one it is not clear which is meant
-_HEAD = 2_000_000  # size [bytes] of a file's beginning that is looked at: robot files are shorter
+_DATA = (".csv", ".jsonl", ".npz", ".parquet")  # endings of tables; before another ending the format is ambiguous
+_HEAD = 2_000_000  # size [bytes] of the beginning that is searched for a robot file's keys
 _kept: set[tuple[int, int]] = set()  # device and inode of the files that the running command reads
 
 
 def protect_input(path: str | os.PathLike[str] | int) -> None:
     """Remember a file that is read: `write_whole` does not replace it, however it is spelled or linked.
 
-    A number is a descriptor: 0 is what standard input comes from.
+    A number is a file descriptor, such as 0 for standard input.
     """
     with suppress(OSError, ValueError):
         status = os.stat(path)
@@ -33,7 +33,7 @@ def protect_input(path: str | os.PathLike[str] | int) -> None:
 
 
 def forget_inputs() -> None:
-    """Forget what was kept: a new command begins."""
+    """Forget the files of the previous command."""
     _kept.clear()
 
 
@@ -41,19 +41,19 @@ def forget_inputs() -> None:
 def write_whole(
     path: str | os.PathLike[str], mode: Literal["w", "wb"] = "w", *, corrects: bool = False
 ) -> Iterator[IO[Any]]:
-    """Open a file for writing that takes its name only when all of it is written.
+    """Open a file for writing that gets its name only after it is written completely.
 
     The text (UTF-8) or bytes go to a temporary file in the same folder, which is renamed at the end and
-    removed if the block raises; a file of that name stays as it was until then. What is not a regular
-    file (a pipe, /dev/null) is written as it stands, and so is what stdout or stderr are redirected to.
-    corrects: the file is a robot file that somebody was asked about. Raises FileError, also for a full disk or a
+    removed if the block raises; an existing file stays unchanged until then. Pipes, devices and files to
+    which stdout or stderr are redirected are written directly.
+    corrects: the file is a robot file that the user has agreed to replace. Raises FileError, also for a full disk or a
     file that may not be written; else UsageError for a robot file, and for a file that the command reads.
     """
     name = os.fspath(path)
     if "\0" in name:
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
     try:
-        real = os.path.realpath(name)  # through a link: what it points to is replaced, not the link
+        real = os.path.realpath(name)  # replace the target of a link, not the link
         status = os.stat(real) if os.path.exists(real) else None
         if status is not None and (not stat.S_ISREG(status.st_mode) or _is_stream(status)):
             with _open(real, _APPEND[mode] if stat.S_ISREG(status.st_mode) else mode) as file:
@@ -61,7 +61,7 @@ def write_whole(
             return
         if status is not None:
             _check_replaceable(name, real, status, corrects=corrects)
-        import tempfile  # needed for writing alone: it takes a millisecond
+        import tempfile  # imported here, as it takes a millisecond and is needed only for writing
 
         handle, temporary = tempfile.mkstemp(prefix=".armkin-", suffix=".part", dir=os.path.dirname(real))
         try:
@@ -74,13 +74,13 @@ def write_whole(
                 os.unlink(temporary)
             raise
     except OSError as error:
-        lost = error.errno == errno.ENOENT and os.path.dirname(name)
-        why = f"there is no folder {lost}" if lost else error.strerror or error
-        raise FileError(f"{name}: cannot write: {why}", file=name) from None
+        missing_folder = error.errno == errno.ENOENT and os.path.dirname(name)
+        reason = f"there is no folder {missing_folder}" if missing_folder else error.strerror or error
+        raise FileError(f"{name}: cannot write: {reason}", file=name) from None
 
 
 def check_writable(path: str | os.PathLike[str]) -> None:
-    """Raise what `write_whole` would of a name: before long work, not after it."""
+    """Raise the errors of `write_whole` for a name, before a long computation instead of after it."""
     name = os.fspath(path)
     if "\0" in name:
         raise FileError(f"{name!r}: cannot write: a name has no null bytes", file=name)
@@ -96,7 +96,7 @@ def check_writable(path: str | os.PathLike[str]) -> None:
 
 
 def file_ending(path: str | os.PathLike[str], content: str, allowed: Sequence[str], *, may_lack: bool = False) -> str:
-    """The ending of a file's name, in lower case: what the file is written as, one of `allowed`.
+    """The ending of a file's name in lower case, which has to be one of `allowed`.
 
     content: such a file's content with its verb, for the message. may_lack: a name without an ending will do, too, and
     gives ""; so does a pipe or device, whatever its name. Raises UsageError for another ending, and for two.
@@ -105,21 +105,21 @@ def file_ending(path: str | os.PathLike[str], content: str, allowed: Sequence[st
     '.npz'
     """
     name = os.fspath(path)
-    stem, end = os.path.splitext(name.lower())
-    before = os.path.splitext(stem)[1]
-    if may_lack and (not end or (os.path.exists(name) and not os.path.isfile(name))):
+    stem, ending = os.path.splitext(name.lower())
+    inner_ending = os.path.splitext(stem)[1]
+    if may_lack and (not ending or (os.path.exists(name) and not os.path.isfile(name))):
         return ""
-    if end not in allowed:
+    if ending not in allowed:
         *earlier, last = allowed
-        kinds, them = (f"{', '.join(earlier)} or {last}", "one of them") if earlier else (last, "that")
-        raise UsageError(f"{name}: {content} written as {kinds}; end the file's name with {them}")
-    if before in (*allowed, *_DATA):
-        raise UsageError(f"{name}: its name has two endings, {before} and {end}; end it with one of them")
-    return end
+        kinds, pronoun = (f"{', '.join(earlier)} or {last}", "one of them") if earlier else (last, "that")
+        raise UsageError(f"{name}: {content} written as {kinds}; end the file's name with {pronoun}")
+    if inner_ending in (*allowed, *_DATA):
+        raise UsageError(f"{name}: its name has two endings, {inner_ending} and {ending}; end it with one of them")
+    return ending
 
 
 def _is_stream(status: os.stat_result) -> bool:
-    """Whether a file is what stdout or stderr are redirected to: writing to /dev/stdout that goes to a log."""
+    """Whether stdout or stderr are redirected to a file, which is then written through /dev/stdout."""
     for number in (1, 2):
         with suppress(OSError):
             if os.path.samestat(status, os.fstat(number)):
@@ -128,7 +128,7 @@ def _is_stream(status: os.stat_result) -> bool:
 
 
 def _check_replaceable(name: str, real: str, status: os.stat_result, *, corrects: bool = False) -> None:
-    """Raise an error where the file is read-only, a robot file, or read by this command."""
+    """Raise an error if the file is read-only, a robot file, or an input of this command."""
     if not status.st_mode & 0o222:
         raise FileError(f"{name}: cannot write: it is read-only; give another name", file=name)
     if corrects:
@@ -148,7 +148,7 @@ def _open(file: str | int, mode: str) -> IO[Any]:
 
 
 def _permissions(path: str) -> int:
-    """Permissions of the file that is replaced, or what the umask leaves of rw-rw-rw-."""
+    """Permissions of the replaced file, or rw-rw-rw- reduced by the umask."""
     with suppress(OSError):
         return stat.S_IMODE(os.stat(path).st_mode)
     mask = os.umask(0)

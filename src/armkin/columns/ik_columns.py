@@ -1,7 +1,7 @@
-"""Targets to the columns of `ik`: one row a target with its best branch, or one a branch.
+"""The columns of `ik`: a row for each target with its best branch, or a row for each branch.
 
-What `armkin.inverse.choose_branch` answers target by target, on arrays; only
-branches that are listed get their residual.
+The answers are those of `armkin.inverse.choose_branch`, computed on arrays; only listed
+branches get a residual.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from armkin.model.lock_joints import unlock
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
 
-BLOCK_TARGETS = 2_048  # targets worked on at once: all their arrays fit the cache
+BLOCK_TARGETS = 2_048  # targets processed together, so that their arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
 
@@ -123,7 +123,7 @@ def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> t
 
 
 def _any_column(flags: Bool) -> Bool:
-    """``flags.any(axis=1)`` of a few columns, column by column, which is quicker."""
+    """``flags.any(axis=1)`` for few columns, column by column, which is faster."""
     any_flag = np.zeros(len(flags), bool)
     for column in flags.T:
         any_flag |= column
@@ -131,7 +131,7 @@ def _any_column(flags: Bool) -> Bool:
 
 
 def _rank_branches(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> NDArray[np.intp]:
-    """Branches (N, B) in the order in which they are listed: free, with hits, outside limits; equal ones as found."""
+    """Branches (N, B) in the order of a list: free, with hits, outside limits; equal ones in their old order."""
     rank = np.argsort(key, axis=1, kind="stable")
     mixed = np.flatnonzero((free != valid).any(axis=1))
     if len(mixed):
@@ -146,15 +146,15 @@ def _joint_motion(q: Array, near: Array, scale: Array) -> Array:
         return _sum_joints(np.abs(q - near) / scale)
     total = np.zeros(q.shape[:-1])
     for i, (start, unit) in enumerate(zip(near, scale, strict=True)):
-        away = q[..., i] - start  # joint by joint: no array of all of them
-        np.abs(away, out=away)
-        away /= unit
-        total += away
+        change = q[..., i] - start  # joint by joint, without an array of all joints
+        np.abs(change, out=change)
+        change /= unit
+        total += change
     return total
 
 
 def _sum_joints(values: Array) -> Array:
-    """``values.sum(axis=-1)``, to the same bits: numpy adds up to seven numbers from left to right, but slowly."""
+    """``values.sum(axis=-1)`` with identical results; numpy sums up to seven numbers from left to right, but slowly."""
     if values.shape[-1] > 7:
         return np.asarray(values.sum(axis=-1))
     total = values[..., 0].copy()

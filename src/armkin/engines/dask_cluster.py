@@ -1,7 +1,7 @@
-"""A Dask cluster: chunks go to its workers, a window of them at a time.
+"""Runs chunks on a Dask cluster, a window of them at a time.
 
-A worker that is killed loses its chunks, and the scheduler gives them to another. A scheduler that is killed ends the
-run; what is finished is with the client. The job travels with every chunk, as bytes that a worker unpacks once.
+If a worker is killed, the scheduler gives its chunks to another worker. If the scheduler is killed, the run ends, but
+the client has all finished results. Every chunk carries the job as bytes, which a worker unpacks once.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from armkin.errors import ArmkinError, ClusterError, MissingExtraError
 Chunk = TypeVar("Chunk")
 Result = TypeVar("Result")
 
-REACHED = 1.5  # time [s] until an address is given up to which no connection comes about
-SECONDS = 10  # time [s] until a scheduler is given up that took the connection but does not answer, or has no worker
+REACHED = 1.5  # longest time [s] to connect to an address
+SECONDS = 10  # longest time [s] to wait for an answer of a connected scheduler, or for a worker
 CHUNKS_AHEAD = 3  # chunks sent ahead to each thread of the workers
 
 
@@ -35,12 +35,12 @@ def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunk
         data = pickle.dumps((work, job))
         yield from _results(client, address, data, iter(chunks))
     finally:
-        with suppress(Exception):  # a scheduler that is gone cannot be told
+        with suppress(Exception):  # the scheduler may be gone
             client.close(timeout=2)
 
 
 def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> Iterator[Any]:
-    """The chunks' answers in their order; `CHUNKS_AHEAD` chunks for each thread, at least two, are on the cluster."""
+    """The results in order, with `CHUNKS_AHEAD` chunks for each thread, at least two, on the cluster."""
     waiting: deque[Any] = deque()
     name = hashlib.sha256(data).hexdigest()
     while True:
@@ -57,7 +57,7 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
         except Exception as error:
             raise _lost_error(client, address, error) from None
         yield answer
-        # a chunk comes in for each that went out: the window stays full
+        # send a chunk for each result, so that the window stays full
         with suppress(StopIteration):
             waiting.append(client.submit(_run_chunk, data, name, next(source), pure=False))
 
@@ -127,7 +127,7 @@ def _check_workers(client: Any, address: str) -> None:
 
 
 def versions() -> dict[str, str]:
-    """What must be the same on every worker."""
+    """Versions that must be the same on every worker."""
     import numpy
 
     from armkin import __version__
@@ -141,7 +141,7 @@ def _run_chunk(data: bytes, name: str, chunk: Any) -> Any:
 
 
 class _PackedJob:
-    """A job's bytes, told apart by their name alone."""
+    """The bytes of a job, compared by their name only."""
 
     def __init__(self, data: bytes, name: str) -> None:
         self.data, self.name = data, name

@@ -1,4 +1,4 @@
-"""Chunks in, results out, in the order of the chunks."""
+"""Runs chunks on an engine and returns their results in the order of the chunks."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ class Engine(NamedTuple):
 
     @property
     def in_process(self) -> bool:
-        """Whether all is done in this process."""
+        """Whether chunks run in this process."""
         return self.workers == 1 and self.cluster is None
 
     @property
     def uses_pool(self) -> bool:
-        """Whether it is done in other processes of this machine."""
+        """Whether chunks run in other processes of this machine."""
         return self.workers > 1 and self.cluster is None
 
 
