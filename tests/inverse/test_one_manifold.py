@@ -33,6 +33,12 @@ HALF_TURNS = [1.710007560461471, -3.141592645536817, -1.524345424490568, -0.7853
               -2.3561944723909973]  # fmt: skip
 ALONE = [-2.3561944768073277, -3.14301958993539, -1.5239035805240875, 0.9905624072906454, -3.141594046209012,
          2.8890822198705735]  # fmt: skip
+# Elbows within 1e-4 rad of folded or stretched, whose two roots meet, while a second direction is lost to 4e-5
+MEETING = {
+    "thor": [-0.42951359943271417, -3.141041883807918, -3.141616452117232, 3.02093705626603, -0.7857010594752032,
+             -1.5707967750023173],
+    "three_dof": [-3.141614336823653, -1.5708555103047157, 9.269870674877077e-05],
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("neighbours", [0, 60])
@@ -146,6 +152,16 @@ def test_self_motions_that_end_half_a_turn_on_are_rows_of_their_own() -> None:
         assert flips.sum() == count
         for way in (np.pi, -np.pi):
             assert _least_misses(arm, T, rows, 3, way).max(axis=0).min() > 1.5e-9
+
+
+@pytest.mark.parametrize(("name", "count"), [("thor", 4), ("three_dof", 1)])
+def test_roots_that_meet_where_a_second_direction_is_nearly_lost_are_one(name: str, count: int) -> None:
+    """Half way between two of them 5e-10 are missed; they were two exact rows, or four where all four meet."""
+    arm = armkin.load(name)
+    T = armkin.fk(arm, MEETING[name]) if arm.n == 6 else armkin.fk(arm, MEETING[name])[:3, 3]
+    solutions = armkin.ik(arm, T)
+    assert solutions.status == armkin.Status.BOUNDARY
+    assert solutions.valid.sum() == count
 
 
 def _least_misses(arm: armkin.Arm, T: Array, q: Array, joint: int, way: float) -> Array:

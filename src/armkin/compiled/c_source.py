@@ -164,8 +164,8 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED, "error": ERROR, "high": HIGH,
         "shrink": local_structure.SHRINK, "bend": local_structure.BEND, "moved": MOVED,
         "same": SAME, "turned": TURNED, "drift": DRIFT,
-        "nearer": local_structure.NEARER, "shorter": local_structure.SHORTER, "longest": local_structure.LONGEST,
-        "gain": local_structure.BOTH_WAYS.gain,
+        "nearer": local_structure.USED_SHARE, "shorter": local_structure.FAILED_RATIO,
+        "longest": local_structure.MAX_RATIO, "gain": local_structure.BOTH_WAYS.gain,
     }  # fmt: skip
     fields = {name: number_text(value) for name, value in values.items()}
     fields["motions"] = str(int(not arm.keep_out))  # with keep-outs, Python searches a self-motion for a free posture
@@ -173,7 +173,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     fields |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
     fields |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
     tables = {"points": local_structure.POINTS, "last": local_structure.TO_LAST}
-    sides = local_structure.BOTH_WAYS, local_structure.AHEAD
+    sides = local_structure.BOTH_WAYS, local_structure.ONE_WAY
     tables |= {"nodes": np.stack([side.node for side in sides]), "fit": np.stack([side.to_powers for side in sides])}
     fields |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
     fields |= {

@@ -140,8 +140,8 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
     const int last = ARM_JOINTS - 1;
     const double sigma = S[last], second = S[last - 1];
     double away[2][ARM_JOINTS], f[2][ARM_JOINTS], more[2][ARM_JOINTS] = {{0.0}}, along[ARM_JOINTS], most = 0.0;
-    double b, size, far, near, h, bend = 0.0, ahead, root;
-    int i, j, k, step, told = 0;
+    double b, size, h, bend = 0.0, ahead, root, before = INFINITY;
+    int i, j, k, step, turning, told = 0;
     for (j = 0; j < ARM_JOINTS; j++) {
         out->v[j] = V[last][j];
         most = fmax(most, fabs(out->v[j]));
@@ -158,15 +158,15 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
         bend += out->w[j] * out->w[j];
     }
     b = along[last], size = fmax(fabs(b), @tiny@);
-    far = 4.0 * sqrt(@solution@ / size), near = 2.0 * @solution@ / sigma;
-    h = fmin(fmax(fmin(far, near), @series@), 4.0 * @series@);
+    turning = sigma * sigma < 2.0 * @solution@ * size;
+    h = turning ? 4.0 * sqrt(@solution@ / size) : 2.0 * @solution@ / sigma;
     /* where |g| is SOLUTION first: with the sign of b; and against it, or beyond the turn */
     ahead = 2.0 * @solution@ / (sigma + sqrt(sigma * sigma + 2.0 * @solution@ * size));
     root = sqrt(fmax(sigma * sigma - 2.0 * @solution@ * size, 0.0));
-    root = sigma * sigma < 2.0 * @solution@ * size ? ahead + 2.0 * sigma / size : 2.0 * @solution@ / (sigma + root);
+    root = turning ? ahead + 2.0 * sigma / size : 2.0 * @solution@ / (sigma + root);
     out->low = b > 0.0 ? -root : -ahead, out->high = b > 0.0 ? ahead : root;
-    for (step = 0; !told && step < @back@; step++) {
-        double rest[2] = {0.0, 0.0}, pushed[2] = {0.0, 0.0}, off, cubic, quartic, third;
+    for (step = 0; h <= @series@ && second * h > 4.0 * @solution@ && !told && step < @back@; step++) {
+        double rest[2] = {0.0, 0.0}, pushed[2] = {0.0, 0.0}, off, cubic, quartic, change;
         for (i = 0; i < 2; i++)
             for (j = 0; j < ARM_JOINTS; j++) {
                 away[i][j] = 0.5 * h * h * out->w[j] + (i ? -h : h) * out->v[j] + more[i][j];
@@ -179,12 +179,14 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
         off = sqrt(fmax(rest[0], rest[1])) / second;
         cubic = fabs(0.5 * (f[0][last] - f[1][last]) - sigma * h);
         quartic = fabs(0.5 * (f[0][last] + f[1][last]) - 0.5 * b * h * h) + ARM_JOINTS * h * off;
-        third = (6.0 * cubic + 12.0 * quartic) / (h * h * h);
+        change = (6.0 * cubic + 12.0 * quartic) / (h * h);
         if (0.5 * h * h * sqrt(bend) + sqrt(fmax(pushed[0], pushed[1])) + off < 0.1 * h) {
-            out->turns = far <= h && third * far < 0.2 * size && sigma * sigma < 2.0 * @solution@ * (size - third * far);
-            told = out->turns || (near <= h && sigma * sigma > 2.0 * @solution@ * (size + third * near));
+            out->turns = turning && change < 0.2 * size && sigma * sigma < 2.0 * @solution@ * (size - change);
+            told = out->turns || (!turning && sigma * sigma > 2.0 * @solution@ * (size + change));
         }
-        for (i = 0; i < 2; i++)
+        if (!(off < 0.5 * before))
+            break;
+        for (before = off, i = 0; i < 2; i++)
             for (j = 0; j < ARM_JOINTS; j++)
                 for (k = 0; k < last; k++)
                     more[i][j] -= V[k][j] * f[i][k] / S[k];

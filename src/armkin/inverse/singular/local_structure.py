@@ -26,14 +26,14 @@ ITERATIONS = 8  # Newton steps onto the curve
 BEND = 8.0  # length of a span, at most, in second smallest singular values, once a longer one did not hold
 SHRINK = 8  # factor by which a span that is shorter still is shortened
 SHRINKS = 3  # times that a span is shortened at most
-SHORTER, LONGEST = 0.35, 2.0  # length of a span relative to the last one, if that does not hold, and at most
-NEARER = 0.5  # share of a span by which what bounds the next one has come nearer
+FAILED_RATIO, MAX_RATIO = 0.35, 2.0  # length of a span relative to the last one, if that does not hold, and at most
+USED_SHARE = 0.5  # share of a span by which what bounds the next one has come nearer
 STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(tol.FIRST_POINT, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
 SIGNS = np.array([1.0, -1.0])[:, None, None]  # senses of a curve: both ways
 BACK = 5  # steps, at most, back onto the curve
-SERIES = 0.01  # distance [rad, reaches] up to which a series of second order is compared with g
+SERIES = 0.04  # distance [rad, reaches], at most, at which a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 FINE_GRID = np.linspace(0.0, 1.0, 33)[:, None]  # parameters of a component at which its slope is compared
@@ -118,7 +118,7 @@ def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array, ahead: A
     linear.V[(linear.V[:, -1] * ahead).sum(axis=1) < 0.0, -1] *= -1.0
     curve = _structure_of_jacobians(linear)
     curve.span[...] = span
-    _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)), AHEAD)
+    _follow(arm, task, q, target, linear.U, linear.V, np.zeros(q.shape), curve, np.arange(len(q)), ONE_WAY)
     return curve
 
 
@@ -157,7 +157,7 @@ def _follow(
     # Newton's method may have found another curve close by: then x(0) is not the posture
     slack = tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
     stays &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + slack)
-    held, curve.longer[rows], curve.followed[rows] = rows[stays], np.where(stays, longer, SHORTER), stays
+    held, curve.longer[rows], curve.followed[rows] = rows[stays], np.where(stays, longer, FAILED_RATIO), stays
     if len(held):
         curve.x[:, held], curve.g[:, held], curve.alone[held] = x[:, stays], g[:, stays], alone[stays]
         _decide(curve, held, side)
@@ -167,7 +167,7 @@ def _follow(
 def _second_order(
     arm: Arm, task: Task, q: Array, target: Array, r: Array, U: Array, S: Array, V: Array, out: Structure
 ) -> Array:
-    """Decide those whose curvature does: g = sigma t + b t^2 / 2, |g'' - b| <= third |t| as far as `SERIES` or 4 times.
+    """Decide those whose curvature does: g = sigma t + b t^2 / 2, as far as that tells, at most `SERIES`.
 
     x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
     close by, third from g at the ends, after steps back onto the curve; what these still miss is counted, too.
@@ -189,10 +189,12 @@ def _second_order(
     b, size = along[:, -1], np.maximum(np.abs(along[:, -1]), tol.TINY)
     inverse = V[:, :-1] / np.maximum(S[:, :-1], tol.WEAK)[:, :, None]
     w = -(inverse * along[:, :-1, None]).sum(axis=1)
-    far, near = 4.0 * np.sqrt(tol.SOLUTION / size), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY)
-    h = np.clip(np.minimum(far, near), SERIES, 4.0 * SERIES)
-    more, close = np.zeros((2, *v.shape)), (r * r).sum(axis=1) < tol.CLOSED**2
-    may = close & (np.where(sigma**2 < 2.0 * tol.SOLUTION * size, far, near) <= h)  # where third is small enough
+    turning = sigma**2 < 2.0 * tol.SOLUTION * size
+    h = np.where(turning, 4.0 * np.sqrt(tol.SOLUTION / size), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY))
+    # what solves the target beside the curve must not pass for its ends
+    may = (h <= SERIES) & ((r * r).sum(axis=1) < tol.CLOSED**2) & (S[:, -2] * h > 4.0 * tol.SOLUTION)
+    h = np.minimum(h, SERIES)
+    more, before = np.zeros((2, *v.shape)), np.inf
     for _ in range(BACK):
         if not may.any():
             break
@@ -200,21 +202,19 @@ def _second_order(
         g, off = rest[:, :, -1], np.linalg.norm(rest[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], tol.TINY)
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
         quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * off
-        third = (6.0 * cubic + 12.0 * quartic) / h**3
-        # far and near beyond h decide nothing, and their products may overflow
-        bends, leans = third * np.minimum(far, h), third * np.minimum(near, h)
-        turns = (far <= h) & (bends < 0.2 * size) & (sigma**2 < 2.0 * tol.SOLUTION * (size - bends))
-        alone = (near <= h) & (sigma**2 > 2.0 * tol.SOLUTION * (size + leans))
+        change = (6.0 * cubic + 12.0 * quartic) / h**2  # of g'', at most
+        turns = turning & (change < 0.2 * size) & (sigma**2 < 2.0 * tol.SOLUTION * (size - change))
+        alone = ~turning & (sigma**2 > 2.0 * tol.SOLUTION * (size + change))
         bent = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(more, axis=2).max(axis=0) + off
-        new = ~out.known & (turns | alone) & (bent < 0.1 * h) & close
+        new = may & (turns | alone) & (bent < 0.1 * h)
         out.followed[new], out.known[new], out.boundary[new] = True, True, turns[new]
-        may &= ~out.known
-        more -= (inverse * rest[:, :, :-1, None]).sum(axis=2)
+        may &= ~new & (off < 0.5 * before)  # the next step must come closer to tell more
+        before, more = off, more - (inverse * rest[:, :, :-1, None]).sum(axis=2)
     # where |g| is `SOLUTION` first: with the sign of b; and against it, or beyond the turn
     ahead = 2.0 * tol.SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * tol.SOLUTION * size))
     rest = np.sqrt(np.maximum(sigma**2 - 2.0 * tol.SOLUTION * size, 0.0))
     beyond = 2.0 * tol.SOLUTION / np.maximum(sigma + rest, tol.TINY)
-    back = np.where(sigma**2 < 2.0 * tol.SOLUTION * size, ahead + 2.0 * sigma / size, beyond)
+    back = np.where(turning, ahead + 2.0 * sigma / size, beyond)
     out.low[...], out.high[...] = np.where(b > 0.0, [-back, ahead], [-ahead, back])
     out.x[1], out.x[2] = v * span[:, None], 0.5 * w * (span**2)[:, None]
     out.g[1, :, 0], out.g[2, :, 0] = sigma * span, 0.5 * b * span**2
@@ -240,7 +240,7 @@ def _polynomials(
     with np.errstate(invalid="ignore", divide="ignore"):
         off = np.maximum(last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION))
         # the last coefficients grow with the span to that power
-        longer = side.gain * np.minimum(0.9 * off ** (1.0 / (2 - NODES)), LONGEST) - NEARER
+        longer = side.gain * np.minimum(0.9 * off ** (1.0 / (2 - NODES)), MAX_RATIO) - USED_SHARE
         on &= off < 1.0
     power = np.tensordot(side.to_powers, values, axes=1)
     alone = _crossed_by_none(inverse, np.multiply.outer(-np.diff(side.node), span))
@@ -312,7 +312,7 @@ _POWERS = np.array([
 ]).T  # fmt: skip
 _SHIFT = np.array([np.pad(np.polynomial.polynomial.polypow([-1.0, 2.0], k), (0, NODES - 1 - k)) for k in range(NODES)])
 BOTH_WAYS = Side(NODE, _POWERS @ _FIT, -1.0, 1.32)
-AHEAD = Side(0.5 * (NODE + 1.0), _SHIFT.T @ _POWERS @ _FIT, 0.0, 1.0)
+ONE_WAY = Side(0.5 * (NODE + 1.0), _SHIFT.T @ _POWERS @ _FIT, 0.0, 1.0)
 TO_LAST = _FIT[-2:]
 
 
