@@ -107,7 +107,7 @@ def test_a_path_from_elsewhere_lost_and_damaged_answers(tmp_path: Path) -> None:
     plan = armkin.path(arm, moves, start=board.machine.joints())
     assert plan.approach is not None
     path_run.follow_plan(
-        board, plan, path_run.lay_parts(plan, board.machine.counts(), board.lay), lambda done, total: None
+        board, plan, path_run.plan_parts(plan, board.machine.counts(), board.plan_trajectory), lambda done, total: None
     )
     distance = np.array([servo.position for servo in port.servos.values()]) - armkin.pulses(arm, plan.motion.end)
     assert np.abs(distance).max() <= 12

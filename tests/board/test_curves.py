@@ -13,7 +13,7 @@ from armkin.board.firmware.segments import curve_segments
 from armkin.board.firmware.segments.counts_to_segments import cycles_of
 from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.board.kinds import board_of
-from armkin.board.path_run import follow_plan, lay_parts
+from armkin.board.path_run import follow_plan, plan_parts
 from armkin.board.sim.segment_queue import intervals
 from armkin.formula.arrays import Array
 from armkin.motion.timing.curved_stretch import Curve
@@ -40,7 +40,7 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     plan = armkin.path(arm, some_path(seed), jerk=np.deg2rad(3000) if seed % 2 else None)
     machine = board.connect(board.simulated())
     machine.prepare()
-    laid = lay_parts(plan, machine.counts(), machine.lay)
+    laid = plan_parts(plan, machine.counts(), machine.plan_trajectory)
     follow_plan(board, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(part.segments for part in laid) < 100 * plan.duration + 50

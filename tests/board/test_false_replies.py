@@ -115,7 +115,7 @@ COMMANDS: dict[str, Callable[[FirmwareMachine], object]] = {
     "send": lambda one: one.run([one.plan(one.counts(), GOAL)]),
     "batch": lambda one: one.run([one.plan(one.counts(), np.stack([GOAL, GOAL / 2, GOAL]))]),
     "curve": lambda one: one.run(
-        [one.lay(round_waypoints(one.arm, one.joints(), CORNERS, 10.0), np.array(one.counts()))]
+        [one.plan_trajectory(round_waypoints(one.arm, one.joints(), CORNERS, 10.0), np.array(one.counts()))]
     ),
     "grip": lambda one: gripping.move_gripper(one, gripping.gripper_of("arm", one.configuration), 1500),
     "home": lambda one: homing.home_joints(one),

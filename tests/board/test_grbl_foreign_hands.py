@@ -188,7 +188,7 @@ def test_a_line_that_another_program_feeds_into_a_motion_is_told_or_harmless(por
         ARM,
         {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": [{"joint": [40, 60, -50]}, {"joint": [0, 90, -90]}]},
     )
-    plan = machine.lay(path.motion, np.array(machine.counts()))
+    plan = machine.plan_trajectory(path.motion, np.array(machine.counts()))
     message = "another program"
     try:
         machine.run([plan])

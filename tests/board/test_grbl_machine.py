@@ -273,7 +273,7 @@ def test_a_pause_of_a_path_is_a_dwell() -> None:
         ARM, {"start": "home", "moves": [{"joint": [0, 80, -80]}, {"wait": 1.5}, {"joint": [0, 90, -90]}]}
     )
     before = port.now()
-    for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
+    for part in path_run.plan_parts(plan, machine.counts(), machine.plan_trajectory):
         assert isinstance(part, Job)
         machine.run([part])
     assert port.now() - before > 1.5

@@ -96,7 +96,7 @@ def test_what_is_as_planned_is_left_alone() -> None:
         machine.prepare()
         moves = [{"joint": [0, 80, -80]}, {"wait": 5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
         plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
-        for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
+        for part in path_run.plan_parts(plan, machine.counts(), machine.plan_trajectory):
             assert isinstance(part, Job)
             machine.run([part])
         assert port.steps[:3] == [0, 0, 0]

@@ -65,7 +65,7 @@ def test_a_sender_that_was_killed_goes_on_where_the_arm_stands(kind: str, after:
     assert machine.prepare(assume=arm.home)
     machine.run([machine.plan(machine.counts(), GOAL)])
     path = armkin.path(arm, {"start": {"joints": [10, 80, -70]}, "blend": 8, "moves": MOVES})
-    plan = machine.lay(path.motion, np.array(machine.counts()))
+    plan = machine.plan_trajectory(path.motion, np.array(machine.counts()))
     began = port.now()
     if after < plan.duration:
         with pytest.raises(Killed):

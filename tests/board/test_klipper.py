@@ -64,7 +64,7 @@ def test_a_curve_goes_on_without_a_stop() -> None:
     moves = [{"joint": [0, 80, -80]}, {"wait": 0.5}, {"joint": [20, 70, -90]}, {"joint": [0, 90, -90]}]
     plan = armkin.path(ARM, {"start": "home", "blend": 5, "moves": moves})
     began = port.now()
-    for part in path_run.lay_parts(plan, machine.counts(), machine.lay):
+    for part in path_run.plan_parts(plan, machine.counts(), machine.plan_trajectory):
         assert isinstance(part, Job)
         machine.run([part])
         x = [float(line.split()[1][1:]) for line in Lines(part, AXES)]
@@ -109,7 +109,7 @@ def test_klipper_s_look_ahead_makes_the_plan_s_own_time_of_the_lines() -> None:
     moves = [{"joint": [0, 80, -80]}, {"joint": [20, 70, -90]}, {"line": [390, 80, 300]}, {"line": [390, -60, 300]}]
     path = armkin.path(ARM, {"start": "home", "blend": 5, "tolerance": 0.1, "moves": moves})
     jobs = [machine.plan(machine.counts(), np.deg2rad(goal)) for goal in ([60, 20, -60], [-100, 0, 20], [0.5, 89, -89])]
-    for job in [*jobs, *path_run.lay_parts(path, machine.counts(), machine.lay)]:
+    for job in [*jobs, *path_run.plan_parts(path, machine.counts(), machine.plan_trajectory)]:
         assert isinstance(job, Job)
         seconds, rests = looked_ahead(list(Lines(job, AXES)))
         assert job.duration <= seconds < job.duration + 0.03

@@ -153,6 +153,15 @@ def test_lost_known_and_changed(three_dof: Arm) -> None:
     assert connect_board(three_dof, port).position() == "lost"
 
 
+def test_motors_that_stand_elsewhere_than_stated_are_named(three_dof: Arm) -> None:
+    machine = connect_board(three_dof)
+    machine.prepare()
+    counts = list(machine.counts())
+    with pytest.raises(LinkError, match=rf"q2 at {counts[1]} counts, not {counts[1] + 5}: home the arm"):
+        machine.vouch({0: counts[0], 1: counts[1] + 5})
+    assert list(machine.counts()) == counts
+
+
 def test_another_board_is_refused(three_dof: Arm, wrist: Arm) -> None:
     with pytest.raises(LinkError, match="sim is mega_ramps14, three_dof's board is uno_cnc_shield"):
         connect_board(three_dof, SimPort(SimBoard(BOARDS["mega_ramps14"])))

@@ -50,9 +50,9 @@ def test_a_plan_that_begins_elsewhere_is_an_error_and_no_motion(kind: str) -> No
     counts, goal = machine.counts(), arm.home + np.deg2rad([5, -5, 5])
     foreign_plan = plan_joints(arm, goal, arm.home)
     with pytest.raises(StartError, match="was made for an arm at"):
-        machine.lay(foreign_plan, np.array(counts))  # the trajectory is not what the counts are
+        machine.plan_trajectory(foreign_plan, np.array(counts))  # the trajectory is not what the counts are
     with pytest.raises(StartError, match="the arm stands at"):
-        machine.run([machine.lay(foreign_plan, armkin.pulses(arm, goal))])  # the counts are not the board's
+        machine.run([machine.plan_trajectory(foreign_plan, armkin.pulses(arm, goal))])  # the counts are not the board's
     machine.refresh()
     assert np.abs(np.array(machine.counts()) - counts).max() <= kind_of_board.rest
     first = machine.plan(counts, goal[None])
@@ -118,7 +118,7 @@ def test_an_arm_outside_its_limits_may_come_back_and_go_no_farther(kind: str) ->
         armkin.path(arm, {"moves": [{"line": [-230, 330, 300]}]}, start=machine.joints())
     farther = Trajectory(arm, machine.joints(), (straight_move(arm, machine.joints(), np.deg2rad([126, 95, -90])),))
     with pytest.raises(NoSolutionError, match=r"q1 = 12[45][.\d]* deg is outside"):
-        machine.lay(farther, np.array(begin))
+        machine.plan_trajectory(farther, np.array(begin))
     assert machine.counts() == begin
     run_jog(kind_of_board, 0, -5, 0.4)
     machine.refresh()

@@ -61,7 +61,7 @@ def test_a_hold_is_gentle_on_curves_alone() -> None:
     machine = machine_on(port)
     moves = {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300]}}]}
     plan = armkin.path(ARM, moves).motion
-    machine.run([machine.lay(plan, np.array(machine.counts()))])
+    machine.run([machine.plan_trajectory(plan, np.array(machine.counts()))])
     gentle = [payload_of(frame)[4] >> 2 for frame in port.sent]
     first = gentle.index(3)
     assert gentle == [0] * first + [3] * (len(gentle) - first)
@@ -129,7 +129,7 @@ def test_a_stall_behind_the_beginning_is_a_hold() -> None:
     port = Stalling(SimBoard(BOARDS["uno_cnc_shield"]), 16, 0.45)
     machine = machine_on(port)
     moves = {"moves": [{"point": [350, 0, 300]}, {"circle": {"centre": [300, 0, 300]}}]}
-    plan = machine.lay(armkin.path(ARM, moves).motion, np.array(machine.counts()))
+    plan = machine.plan_trajectory(armkin.path(ARM, moves).motion, np.array(machine.counts()))
     with pytest.raises(HeldError, match="keep its queue filled"):
         machine.run([plan])
     assert machine.counts() != tuple(plan.end.tolist())

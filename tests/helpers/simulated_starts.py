@@ -174,7 +174,7 @@ def carried_out(kind: Kind, moves: dict[str, Any], place: Sequence[float]) -> Re
     machine.refresh()
     moves = {**moves, "moves": [m for m in moves["moves"] if kind.grips or "grip" not in m]}
     plan = armkin.path(arm, moves, start=machine.joints())
-    laid = path_run.lay_parts(plan, machine.counts(), machine.lay)
+    laid = path_run.plan_parts(plan, machine.counts(), machine.plan_trajectory)
     kind.pins()
     path_run.follow_plan(kind.board, plan, laid, lambda done, total: None)
     return judge_motion(plan, np.array([*kind.pins(), list(machine.counts())], dtype=float))

@@ -36,7 +36,7 @@ def open_board(
         yield machine
         _log_position("left", machine)
     except StoppedError as error:
-        board.stopped(error)
+        board.on_stopped(error)
         _log_position("stopped", board.machine)
         raise
     except ArmkinError as error:

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from armkin.board.backend.board import Board
     from armkin.motion.plan.path_plan import Marker, PathPlan
 
-Lay = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # makes a board's plan of a trajectory from counts
+PlanTrajectory = Callable[[Trajectory, "NDArray[np.int64]"], "Planned"]  # a board's plan of a trajectory from counts
 
 
-def lay_parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
+def plan_parts(plan: PathPlan, start: Sequence[int], plan_trajectory: PlanTrajectory) -> list[Planned]:
     """The approach of a plan, if it has one, and the parts of its motion between gripper moves, as plans for a board.
 
     Raises UsageError if the board is too slow for it.
@@ -30,11 +30,11 @@ def lay_parts(plan: PathPlan, start: Sequence[int], lay: Lay) -> list[Planned]:
     edges = [0, *(marker.before for marker in plan.markers), len(motion.stretches)]
     parts, begin, q = [], np.asarray(start, dtype=np.int64), motion.start
     if plan.approach is not None:
-        parts.append(lay(plan.approach, begin))
+        parts.append(plan_trajectory(plan.approach, begin))
         begin = parts[0].end
     for a, b in pairwise(edges):
         trajectory = Trajectory(plan.arm, q, motion.stretches[a:b])
-        part = lay(trajectory, begin)
+        part = plan_trajectory(trajectory, begin)
         parts.append(part)
         begin, q = part.end, trajectory.end
     return parts

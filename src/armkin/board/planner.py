@@ -47,7 +47,7 @@ class Planner:
             return self.board.plan(start, q, self.speed)
         begin = np.asarray(start, dtype=np.int64)
         motion = round_waypoints(self.arm, joints(self.arm, begin), q, self.blend, speed=self.speed, hold=HOLD_FACTOR)
-        return self.board.lay(motion, begin)
+        return self.board.plan_trajectory(motion, begin)
 
     def sum_up(self, plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
         """Pass plans on and add them to `total_sent`, without keeping them, since rows may arrive for hours."""

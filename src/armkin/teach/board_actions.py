@@ -234,7 +234,7 @@ class BoardActions:
         path_run.check_gripper(plan, self.thread.board)
         path_run.check_pauses(plan, answers=False)
         board = self.thread.board
-        self._carry_out(plan, path_run.lay_parts(plan, machine.counts(), board.lay))
+        self._carry_out(plan, path_run.plan_parts(plan, machine.counts(), board.plan_trajectory))
 
     def _carry_out(self, plan: PathPlan, parts: list[Planned]) -> None:
         self.thread.parts = [part.trajectory for part in parts]
@@ -253,7 +253,7 @@ class BoardActions:
         end_text = ""
         while not end_text and self._held_down():
             plan, end_text = jog_line(self.arm, machine.joints(), axis, frame, share)
-            parts = path_run.lay_parts(plan, machine.counts(), self.thread.board.lay)
+            parts = path_run.plan_parts(plan, machine.counts(), self.thread.board.plan_trajectory)
             with self.thread.held_motion(lambda: not self._held_down()):
                 self._carry_out(plan, parts)
         if end_text and self._held_down():

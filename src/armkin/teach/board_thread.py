@@ -175,7 +175,7 @@ class BoardThread:
     def _watch(self) -> bool:
         """Called at every turn of a session: publish the position, and return whether to stop."""
         if self.machine is not None and time.monotonic() - self._told_at >= _TELL_PERIOD:
-            self.board.heard()
+            self.board.on_report()
             self._publish()
         return self._stop.is_set() or self._let_go()
 
@@ -188,7 +188,7 @@ class BoardThread:
         except StoppedError as error:
             if self._stop.is_set():
                 raise
-            self.board.stopped(error)
+            self.board.on_stopped(error)
         finally:
             self._let_go = lambda: False
 
@@ -207,7 +207,7 @@ class BoardThread:
 
     def _note_stop(self, error: StoppedError) -> None:
         if self.machine is not None:
-            self.board.stopped(error)
+            self.board.on_stopped(error)
         self._error = "stopped"
         self._stop.clear()
 

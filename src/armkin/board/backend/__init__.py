@@ -112,10 +112,10 @@ class Backend(ABC):
 
     def plan(self, start: Sequence[int], targets: Array, *, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return self.lay(*plan_targets(self.arm, start, targets, speed))
+        return self.plan_trajectory(*plan_targets(self.arm, start, targets, speed))
 
     @abstractmethod
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
 
     @abstractmethod

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.robot_file.robot_keys import Gripper
 
-Never = Callable[[], bool]
+StopRequested = Callable[[], bool]
 JOG_PIECE = 0.3  # length [s] of one piece of a jog on a board that cannot extend a motion
 
 CAPABILITIES = {
@@ -79,7 +79,7 @@ class Board(ABC):
     hint: ClassVar[str] = "armkin ports lists them"  # how the user finds the names of its ports
     home_speed: ClassVar[float] = 1.0  # fraction of the joints' speeds on a move to the home pose
     machine: Backend  # set by connect
-    stop: Never
+    stop: StopRequested
 
     def __init__(self, arm: Arm, *, rehearsal: bool = False) -> None:
         """Raises UsageError, with the missing keys, if the arm cannot be planned or driven.
@@ -99,7 +99,7 @@ class Board(ABC):
         """Raise UsageError if the arm's drives are not for this kind of board."""
 
     @abstractmethod
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
 
     @abstractmethod
@@ -107,11 +107,11 @@ class Board(ABC):
         """A board of this kind in this process, set up for the arm, which stands at home."""
 
     @abstractmethod
-    def attach(self, port: Port, stop: Never) -> Backend:
+    def attach(self, port: Port, stop: StopRequested) -> Backend:
         """The arm on the board behind an open port. Raises LinkError if no such board answers there."""
 
     @abstractmethod
-    def replies(self, link: Port, stop: Never) -> bool:
+    def replies(self, link: Port, stop: StopRequested) -> bool:
         """Whether such a board replies behind an open port. Raises LinkError, too, if none does."""
 
     # Methods that most kinds share
@@ -133,7 +133,7 @@ class Board(ABC):
 
     def plan(self, start: Sequence[int], targets: Array, speed: float = 1.0) -> Planned:
         """Moves from counts through joint targets (w, n) [rad | mm], stopping at each."""
-        return self.lay(*plan_targets(self.arm, start, targets, speed))
+        return self.plan_trajectory(*plan_targets(self.arm, start, targets, speed))
 
     def likely(self) -> list[str]:
         """Names of the ports where such a board may be: Arduinos, and the chips of ESP32s and adapters."""
@@ -143,7 +143,9 @@ class Board(ABC):
         """The port of that name; `sim`: a board of this kind in this process."""
         return self.simulated() if name == SIM else SerialPort(name, baud or self.baud, reset=reset)
 
-    def answers(self, name: str, baud: int | None = None, stop: Never = lambda: False, *, reset: bool = True) -> bool:
+    def answers(
+        self, name: str, baud: int | None = None, stop: StopRequested = lambda: False, *, reset: bool = True
+    ) -> bool:
         """Whether such a board answers at a port. Nothing moves."""
         with suppress(LinkError), closing(self.open(name, baud, reset=reset)) as link:
             return self.replies(link, stop)
@@ -151,7 +153,7 @@ class Board(ABC):
 
     # Methods of a connected board
 
-    def connect(self, port: Port, stop: Never = lambda: False) -> Backend:
+    def connect(self, port: Port, stop: StopRequested = lambda: False) -> Backend:
         """Connect the arm to the board behind an open port and set `machine`. Raises as `attach` does.
 
         stop: called again and again; when it returns True, the arm is held and StoppedError is raised.
@@ -170,11 +172,11 @@ class Board(ABC):
             self.machine.port.read(0.01)
         return not self.stop()
 
-    def heard(self) -> None:
+    def on_report(self) -> None:
         """Process the newest position report while the arm moves."""
         return
 
-    def stopped(self, error: StoppedError) -> None:
+    def on_stopped(self, error: StoppedError) -> None:
         """Process the report of where the arm came to rest."""
         return
 
@@ -188,7 +190,7 @@ class Board(ABC):
         """
         yield parts, 0, lambda seconds: None
 
-    def forget(self) -> None:
+    def adopt_robot_file(self) -> None:
         """Make the board accept the present robot file; the position that it had is lost."""
         return
 
@@ -220,7 +222,7 @@ class Board(ABC):
             move = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
             if not move.duration:
                 return  # the joint stands at its limit, or before a keep-out
-            self.machine.run([self.lay(Trajectory(arm, move.start, (move,)), np.array(counts))])
+            self.machine.run([self.plan_trajectory(Trajectory(arm, move.start, (move,)), np.array(counts))])
             seconds_left -= piece_time
 
     # Capabilities

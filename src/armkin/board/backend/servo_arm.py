@@ -154,7 +154,7 @@ class ServoArm(Backend):
 
     # Moving
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,). Raises NoSolutionError as `_check_limits` does."""
         servo_job = job(trajectory, start)
         self._check_limits(servo_job)

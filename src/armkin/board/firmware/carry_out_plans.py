@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from armkin.board.firmware.wire.session import Session
     from armkin.motion.timing.trajectory import Trajectory
 
-    Lay = Callable[[Trajectory, Counts], Cut]
+    PlanTrajectory = Callable[[Trajectory, Counts], Cut]
 
 # longest beginning [s] of a motion, and longest stop [s] in it, after which it continues by itself
 _BEGINNING_TIME, _STAND_TIME = 0.7, 1.0
@@ -46,7 +46,7 @@ class _UnderWay:
             self._moves.popleft()
 
     def remaining_plan(
-        self, session: Session, axes: Sequence[int], lay: Lay, *, first: bool
+        self, session: Session, axes: Sequence[int], plan_trajectory: PlanTrajectory, *, first: bool
     ) -> tuple[Sequence[Cut], float] | None:
         """The remaining plans of an arm whose queue ran dry, and the seconds done; None unless in a move's beginning.
 
@@ -60,7 +60,7 @@ class _UnderWay:
         if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
             return None
         plans = [plan, *(plan for *_, plan, move_number in islice(self._moves, 1, None) if move_number == 0)]
-        remaining = left_of(plans, number, [status.counts[axis] for axis in axes], lay)
+        remaining = left_of(plans, number, [status.counts[axis] for axis in axes], plan_trajectory)
         stop_time = session.deaf + session.port.now() - start_time
         if remaining is None or remaining[1].seconds > _BEGINNING_TIME or stop_time > _STAND_TIME:
             return None
@@ -68,11 +68,15 @@ class _UnderWay:
 
 
 def carry_out(
-    session: Session, plans: Iterable[Cut | None], axes: Sequence[int], progress: Progress, lay: Lay
+    session: Session,
+    plans: Iterable[Cut | None],
+    axes: Sequence[int],
+    progress: Progress,
+    plan_trajectory: PlanTrajectory,
 ) -> tuple[Status, Counts | None]:
     """Carry out plans in order; a None among them means that the next plan is not there yet.
 
-    axes: the motors' axes on the board. lay: makes a plan for this board from a trajectory.
+    axes: the motors' axes on the board. plan_trajectory: makes a plan for this board from a trajectory.
     Returns the status at rest, and the end of the last plan. Raises DeviceError if the board ends the session. If a
     busy computer or a bad line lets the queue run dry in a move's beginning, the remainder follows with more time to
     fill the queue, unless the arm has stopped for so long that somebody may be near it.
@@ -86,7 +90,9 @@ def carry_out(
         except DeviceError as error:
             ran_dry = error.error == Error.DRY
             remaining = (
-                run.under_way.remaining_plan(session, axes, lay, first=min_pause < MAX_LEAD) if ran_dry else None
+                run.under_way.remaining_plan(session, axes, plan_trajectory, first=min_pause < MAX_LEAD)
+                if ran_dry
+                else None
             )
             if remaining is None:
                 raise
@@ -133,13 +139,15 @@ class _Run:
         self._progress(self._done, self._total)
 
 
-def carry_out_axis(session: Session, lay: Callable[[int], Move | None], axis: int, count: int, clock: int) -> Status:
-    """Carry out the move of one axis, which `lay` makes from `count`; None from `lay`: it is at its end.
+def carry_out_axis(
+    session: Session, plan_move: Callable[[int], Move | None], axis: int, count: int, clock: int
+) -> Status:
+    """Carry out the move of one axis, which `plan_move` makes from `count`; None: it is at its end.
 
     If the queue runs dry in its beginning, the remainder follows once, as in `carry_out`.
     """
     min_pause = 0.0
-    while (move := lay(count)) is not None:
+    while (move := plan_move(count)) is not None:
         session.attend()
         try:
             return stream_frames(session, motion_batches(session, move, (axis,), clock, min_pause), lambda left: None)

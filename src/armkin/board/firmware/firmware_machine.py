@@ -21,7 +21,7 @@ from armkin.board.firmware.wire.session import DeviceError, Session, probe_line
 from armkin.board_catalogue import board_name
 from armkin.errors import LinkError, PositionKnownError
 from armkin.model.units import joints_out
-from armkin.motors import pulses
+from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
     from armkin.board.firmware.configuration import Configuration
@@ -95,7 +95,7 @@ class FirmwareMachine(Backend):
         """Read the arm's position again."""
         self.status = self.session.status()
 
-    def heard(self) -> None:
+    def take_report(self) -> None:
         """Process the newest status that arrived while the arm moves."""
         if self.session.latest is not None:
             self.status = self.session.latest
@@ -156,14 +156,19 @@ class FirmwareMachine(Backend):
 
     def vouch(self, counts: dict[int, int]) -> None:
         """Set the positions of lost axes as the operator states them: {axis: counts}."""
-        missing = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
-        if any(self.status.counts[axis] != count for axis, count in counts.items() if axis not in missing):
+        lost = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
+        names = dict(zip(self.configuration.axes, motor_names(self.arm), strict=True))
+        if contradictions := [
+            f"{names.get(axis, 'the gripper')} at {self.status.counts[axis]} counts, not {count}"
+            for axis, count in counts.items()
+            if axis not in lost and self.status.counts[axis] != count
+        ]:
             raise LinkError(
-                "some axes know their position and do not stand there: home the arm, or switch the board "
-                "off and on to forget all"
+                f"the board knows other positions than those stated: {'; '.join(contradictions)}: home the arm, or "
+                "switch the board off and on to forget all"
             )
-        if missing:
-            self._call_board(lambda tag: protocol.set_position(tag, missing))
+        if lost:
+            self._call_board(lambda tag: protocol.set_position(tag, lost))
             self._renew_info()
 
     def _renew_info(self) -> None:
@@ -181,7 +186,7 @@ class FirmwareMachine(Backend):
             self.arm, start, targets, speed=speed, clock=info.clock, min_interval=info.min_interval
         )
 
-    def lay(self, trajectory: Trajectory, start: Counts) -> trajectory_to_counts.Cut:
+    def plan_trajectory(self, trajectory: Trajectory, start: Counts) -> trajectory_to_counts.Cut:
         """The plan of a trajectory that starts at counts (motors,), for the connected board."""
         return trajectory_to_counts.cut_trajectory(
             trajectory, start, clock=self.info.clock, min_interval=self.info.min_interval
@@ -196,7 +201,7 @@ class FirmwareMachine(Backend):
         """
         try:
             self.status, end = carry_out(
-                self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self.lay
+                self.session, from_counts(plans, self.counts), self.configuration.axes, progress, self.plan_trajectory
             )
         except StoppedError as stopped:
             self.status = stopped.status or self.status
@@ -205,7 +210,7 @@ class FirmwareMachine(Backend):
             raise resets_and_stops.explain_error(self, error) from None
         if self.position() == "lost":
             raise resets_and_stops.position_lost_error(self, "the board has lost the arm's position on the way")
-        self.in_time()
+        self.check_late_ticks()
         if end is not None and self.counts() != tuple(end.tolist()):
             raise LinkError(
                 f"the board says that it stands at {list(self.counts())}, the plan ends at {end.tolist()}: "
@@ -213,15 +218,15 @@ class FirmwareMachine(Backend):
             )
         return self.status
 
-    def in_time(self) -> None:
+    def check_late_ticks(self) -> None:
         """Raise LinkError if the board reports late ticks."""
         if late := self.status.overruns:
             raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing_text()}")
 
-    def run_axis(self, lay: Callable[[int], Move | None], axis: int, clock: int) -> Status:
-        """Carry out the gripper's move, which `lay` makes from its counts; None from `lay`: it has arrived."""
+    def run_axis(self, plan_move: Callable[[int], Move | None], axis: int, clock: int) -> Status:
+        """Carry out the gripper's move, which `plan_move` makes from its counts; None: it has arrived."""
         try:
-            self.status = carry_out_axis(self.session, lay, axis, self.status.counts[axis], clock)
+            self.status = carry_out_axis(self.session, plan_move, axis, self.status.counts[axis], clock)
         except DeviceError as error:
             raise resets_and_stops.explain_error(self, error) from None
         return self.status

@@ -66,7 +66,7 @@ def move_gripper(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
     assert gripper.accel is not None
     top, accel, board = gripper.top, gripper.accel, machine.configuration.board
 
-    def lay(position: int) -> Move | None:
+    def plan_move(position: int) -> Move | None:
         distance = abs(target - position)
         clock, interval = board.clock, board.min_interval
         return (
@@ -76,8 +76,8 @@ def move_gripper(machine: FirmwareMachine, gripper: Grip, target: int) -> int:
         )
 
     if machine.status.counts[gripper.axis] != target:
-        machine.run_axis(lay, gripper.axis, board.clock)
-        machine.in_time()
+        machine.run_axis(plan_move, gripper.axis, board.clock)
+        machine.check_late_ticks()
         if not gripper_known(machine, gripper):
             raise GripperLostError("the board has lost the gripper's position on the way")
         if machine.status.counts[gripper.axis] != target:

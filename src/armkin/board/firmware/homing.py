@@ -159,7 +159,7 @@ def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Statu
         for _ in session.arrivals(search.time / 10):
             pass
         machine.status = session.status()
-        machine.in_time()
+        machine.check_late_ticks()
         return machine.status, session.status(page=1)
     except DeviceError as error:
         raise resets_and_stops.explain_error(machine, error) from None

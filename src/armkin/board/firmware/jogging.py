@@ -108,4 +108,4 @@ def jog_motors(
     except DeviceError as error:
         raise resets_and_stops.explain_error(machine, error) from None
     machine.status = session.status()
-    machine.in_time()
+    machine.check_late_ticks()

@@ -148,7 +148,7 @@ def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place
     """The parts from a place on: the first one starts at the arm's position, the others are unchanged."""
     trajectory = remaining_trajectory(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)
-    return [machine.lay(trajectory, counts), *parts[place.part + 1 :]]
+    return [machine.plan_trajectory(trajectory, counts), *parts[place.part + 1 :]]
 
 
 def _read_held_note(path: str) -> Note | None:

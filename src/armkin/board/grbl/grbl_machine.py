@@ -119,7 +119,7 @@ class GrblMachine(StepperArm):
 
     # Moving
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
         return trajectory_to_gcode.job(trajectory, start)
 

@@ -39,7 +39,7 @@ class ServoBusBoard(Board):
         """Raise UsageError if the arm's motors are no servos of one bus."""
         servo_ids(self.arm)
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
         return job(trajectory, start)
 

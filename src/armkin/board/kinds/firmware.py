@@ -78,7 +78,7 @@ class FirmwareBoard(Board):
         """The kind in words."""
         return f"{'an' if self.kind[0] in 'aeiou' else 'a'} {self.kind}"
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,), refused if the board is too slow for it."""
         return cut_trajectory(trajectory, start, **self._figures)
 
@@ -115,16 +115,16 @@ class FirmwareBoard(Board):
         """Begin a new session: what ended the last one is over."""
         self.connect(self.machine.port, self.stop)
 
-    def heard(self) -> None:
+    def on_report(self) -> None:
         """Take the newest status that has come while the arm moves."""
-        self.machine.heard()
+        self.machine.take_report()
 
-    def forget(self) -> None:
+    def adopt_robot_file(self) -> None:
         """Write the configuration if the board has another one: all positions are lost with it."""
         if not self.machine.configured:
             self.machine.configure()
 
-    def stopped(self, error: StoppedError) -> None:
+    def on_stopped(self, error: StoppedError) -> None:
         """Take the status of the arm at rest."""
         if error.status is not None:
             self.machine.status = error.status

@@ -39,7 +39,7 @@ class GrblBoard(Board):
         """Raise UsageError if the arm's motors cannot be GRBL's axes."""
         axes_of(self.arm)
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Planned:
         """A trajectory that starts at counts (motors,)."""
         return job(trajectory, start)
 

@@ -109,7 +109,7 @@ class KlipperMachine(StepperArm):
 
     # Moving
 
-    def lay(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
+    def plan_trajectory(self, trajectory: Trajectory, start: NDArray[np.int64]) -> Job:
         """A trajectory that starts at counts (motors,)."""
         return job(trajectory, start)
 

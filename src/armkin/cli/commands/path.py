@@ -214,7 +214,7 @@ def _carry_out_path(question: _Question, link: Link, out: str | None, plot: str 
             plan = _make_plan(question._replace(arm=arm, options=options), json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
-            parts = path_run.lay_parts(plan, began, board.lay)
+            parts = path_run.plan_parts(plan, began, board.plan_trajectory)
             _write_files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")
@@ -299,7 +299,9 @@ def _lay_rehearsal(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] |
         return None
     if rehearsal:
         path_run.check_gripper(plan, board)
-    return path_run.lay_parts(plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.lay)
+    return path_run.plan_parts(
+        plan, pulses(plan.arm, (plan.approach or plan.motion).start).tolist(), board.plan_trajectory
+    )
 
 
 def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:

@@ -40,11 +40,11 @@ def remaining_trajectory(part: Cut, place: Place, present: Array) -> Trajectory:
 
 
 def left_of(
-    plans: Sequence[Cut], move: int, counts: Sequence[int], lay: Callable[[Trajectory, np.ndarray], Cut]
+    plans: Sequence[Cut], move: int, counts: Sequence[int], plan_trajectory: Callable[[Trajectory, np.ndarray], Cut]
 ) -> tuple[Sequence[Cut], Place] | None:
     """The remainder of plans for an arm at rest on a move of the first one, and its place on that move.
 
-    counts: the arm's position; lay: makes a plan for its board from a trajectory. None: the arm is not on that move.
+    counts: the arm's position; plan_trajectory: makes a plan for its board. None: the arm is not on that move.
     """
     first, present = plans[0], np.array(counts, dtype=np.int64)
     if move == 0 and (present == first.start).all():
@@ -53,7 +53,7 @@ def left_of(
     if place is None:
         return None
     remaining = remaining_trajectory(first, place, joints(first.trajectory.arm, present))
-    return [lay(remaining, present), *plans[1:]], place
+    return [plan_trajectory(remaining, present), *plans[1:]], place
 
 
 def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
