@@ -64,16 +64,17 @@ def test_status(name: str, target: list[float], status: Status, joints: list[str
         assert s.residual()[0][s.valid].max() < 1e-9 * s.arm.reach  # home solves one of them so far
 
 
-@pytest.mark.parametrize("name", ["yaw_two_link", "planar_2dof"])
+@pytest.mark.parametrize(
+    ("name", "boundary", "count"), [("yaw_two_link", [860, 0, 660], 2), ("planar_2dof", [500, 0], 1)]
+)
 @pytest.mark.parametrize(("beyond", "reached"), [(1e-12, True), (5e-10, True), (3e-9, False)])
-def test_just_beyond_the_boundary(name: str, beyond: float, reached: bool) -> None:
+def test_just_beyond_the_boundary(name: str, boundary: list[float], count: int, beyond: float, reached: bool) -> None:
     """Less than 1e-9 of the reach outside is answered, with its residual; more is not."""
     arm = load_robot(name)
-    target = [860 + arm.reach * beyond, 0, 660] if name == "yaw_two_link" else [500 + arm.reach * beyond, 0]
-    s = armkin.ik(arm, target)
+    s = armkin.ik(arm, [boundary[0] + arm.reach * beyond, *boundary[1:]])
     if reached:
         assert s.status == Status.BOUNDARY
-        assert s.valid.sum() == (2 if name == "yaw_two_link" else 1)
+        assert s.valid.sum() == count
         assert s.residual()[0][s.valid].max() <= 1e-9 * arm.reach
     else:
         assert s.status == Status.UNREACHABLE
@@ -82,23 +83,23 @@ def test_just_beyond_the_boundary(name: str, beyond: float, reached: bool) -> No
 
 
 @pytest.mark.parametrize(
-    ("name", "joint", "loose", "curves"),
+    ("name", "elbow", "joint", "loose", "curves"),
     [
         # wrist stretched: axes 4 and 6 are one
-        ("puma560", 4, [3, 5], 1),
-        ("irb120", 4, [3, 5], 1),
-        ("stanford", 4, [3, 5], 1),
-        ("ar4", 4, [3, 5], 1),
+        ("puma560", [-1.0, 1.2], 4, [3, 5], 1),
+        ("irb120", [-1.0, 1.2], 4, [3, 5], 1),
+        ("stanford", [0.5, 400], 4, [3, 5], 1),  # its joint 3 slides [mm]
+        ("ar4", [-1.0, 1.2], 4, [3, 5], 1),
         # axis 6 parallel to 2, 3 and 4: a linkage of four bars, the elbow up or down
-        ("ur5e", 4, [1, 2, 3, 5], 2),
-        ("ur3e", 4, [1, 2, 3, 5], 2),
+        ("ur5e", [-1.0, 1.2], 4, [1, 2, 3, 5], 2),
+        ("ur3e", [-1.0, 1.2], 4, [1, 2, 3, 5], 2),
     ],
 )
-def test_a_wrist_singularity_is_a_self_motion(name: str, joint: int, loose: list[int], curves: int) -> None:
+def test_a_wrist_singularity_is_a_self_motion(
+    name: str, elbow: list[float], joint: int, loose: list[int], curves: int
+) -> None:
     arm = load_robot(name)
-    q = np.array([0.3, -1.0, 1.2, -0.4, 0.0, 0.7])
-    if name == "stanford":
-        q[1:3] = 0.5, 400
+    q = np.array([0.3, *elbow, -0.4, 0.0, 0.7])
     q[joint] = 0.0
     s = armkin.ik(arm, armkin.fk(arm, q), near=q)
     assert s.status == Status.SINGULAR

@@ -14,7 +14,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 
 
-class Way(Protocol):
+class JointMotion(Protocol):
     """Joint values along a motion."""
 
     @property

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from armkin.keep_out.body_pairs import Guard
-    from armkin.keep_out.motion_geometry import Way
+    from armkin.keep_out.motion_geometry import JointMotion
 
 STEP = 0.01  # motion [mm] of the bodies below which no interval is halved
 _FIRST = 16  # intervals at the start of a proof
@@ -50,7 +50,9 @@ class Proof:
     postures: int
 
 
-def prove_motion(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None) -> Proof:
+def prove_motion(
+    guard: Guard, motion: JointMotion, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None
+) -> Proof:
     """Prove a motion free, or find its first hit.
 
     tight: refine until the bound is close to the least sampled clearance. ignored_pairs: pairs that may overlap at the
@@ -58,20 +60,20 @@ def prove_motion(guard: Guard, way: Way, *, tight: bool = False, ignored_pairs: 
     """
     if not guard.pairs:
         return Proof(free=True, place=0.0, pair=None, mm=np.inf, escaping=(), postures=0)
-    places = np.unique(np.round(np.linspace(0.0, way.cells, min(way.cells, _FIRST) + 1)))
-    q = way.joints_at(places)
-    slide_out = np.abs(q).max(axis=0) + way.variation(np.zeros(1), np.array([float(way.cells)]))[0]
+    places = np.unique(np.round(np.linspace(0.0, motion.cells, min(motion.cells, _FIRST) + 1)))
+    q = motion.joints_at(places)
+    slide_out = np.abs(q).max(axis=0) + motion.variation(np.zeros(1), np.array([float(motion.cells)]))[0]
     lever = levers(guard, slide_out)
     clearances = guard.clearances(q)
     overlaps_at_start = clearances[0] < 0.0
     if ignored_pairs is not None:
         overlaps_at_start = overlaps_at_start & np.isin(np.arange(len(overlaps_at_start)), ignored_pairs)
     while True:
-        refinement = _Round(places, clearances, way.variation(places[:-1], places[1:]) @ lever, overlaps_at_start)
+        refinement = _Round(places, clearances, motion.variation(places[:-1], places[1:]) @ lever, overlaps_at_start)
         middle = refinement.to_halve(tight)
         if not len(middle):
             return refinement.result()
-        q = way.joints_at(middle)
+        q = motion.joints_at(middle)
         positions = np.searchsorted(places, middle)
         places = np.insert(places, positions, middle)
         clearances = np.insert(clearances, positions, guard.clearances(q), axis=0)

@@ -74,7 +74,10 @@ class StepperArm(Backend):
 
     def report(self) -> dict[str, Any]:
         """What `armkin status` tells besides the position."""
-        return {"settings": [str(difference) for difference in self.wrong()], "lost_because": self.loss_reason or None}
+        return {
+            "settings": [str(difference) for difference in self.setting_differences()],
+            "lost_because": self.loss_reason or None,
+        }
 
     def prepare(self, *, assume: Array | None = None) -> bool:
         """Check settings and position; True if the position was lost and is now `assume`."""
@@ -146,7 +149,7 @@ class StepperArm(Backend):
     # What depends on the board
 
     @abstractmethod
-    def wrong(self) -> Sequence[Any]:
+    def setting_differences(self) -> Sequence[Any]:
         """Settings that differ from the robot file."""
 
     @abstractmethod

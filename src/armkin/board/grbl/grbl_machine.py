@@ -76,7 +76,7 @@ class GrblMachine(StepperArm):
 
     # Getting ready
 
-    def wrong(self) -> list[settings.Difference]:
+    def setting_differences(self) -> list[settings.Difference]:
         """Settings that differ from the robot file."""
         return settings.differences(self.axes, self.settings, hal=self.session.hal)
 
@@ -85,7 +85,7 @@ class GrblMachine(StepperArm):
 
         The position is lost: its steps may mean something else now. Raises LinkError if a setting did not take.
         """
-        written = self.wrong()
+        written = self.setting_differences()
         for difference in written:
             self.session.ask(difference.line())
         self.settings = self.session.settings()
@@ -93,7 +93,7 @@ class GrblMachine(StepperArm):
             self._place.forget("its settings were written")
             with suppress(LinkError):  # an alarm or a lost connection does not matter here
                 self._reset()
-        remaining = self.wrong()
+        remaining = self.setting_differences()
         if remaining:
             raise LinkError(f"GRBL did not keep what was written: {remaining[0]}")
         return written
@@ -194,7 +194,9 @@ class GrblMachine(StepperArm):
 
         Raises LinkError, before anything moves, if GRBL's settings have it look at the other end.
         """
-        of_homing = [difference for difference in self.wrong() if difference.number in settings.HOMING_SETTINGS]
+        of_homing = [
+            difference for difference in self.setting_differences() if difference.number in settings.HOMING_SETTINGS
+        ]
         serious = [difference for difference in of_homing if difference.actual is not None]
         if serious:
             raise LinkError(f"GRBL would not home as {self.arm.name} needs: {serious[0]}; armkin setup writes it")
@@ -219,6 +221,6 @@ def _serious_differences(machine: GrblMachine) -> list[settings.Difference]:
     session, present = machine.session, machine.port.now()
     for _ in range(2 if session.was_reset or present > machine.settings_time + _MAX_SETTINGS_AGE else 0):
         machine.settings, machine.settings_time = session.settings(), present
-        if not any(difference.serious for difference in machine.wrong()):
+        if not any(difference.serious for difference in machine.setting_differences()):
             break
-    return [difference for difference in machine.wrong() if difference.serious]
+    return [difference for difference in machine.setting_differences() if difference.serious]

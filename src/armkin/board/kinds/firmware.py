@@ -176,13 +176,13 @@ class FirmwareBoard(Board):
         """Home joints, one after another. Raises HomingIncompleteError if others are still lost."""
         arm = self.arm
         steps = homing.home_joints(self.machine, joints, announce, rest_at_home=rest_at_home)
-        if lost := homing.lost_joints(self.machine):
-            homed = [name for name in arm.joint_names if name not in lost]
+        if lost_joints := homing.lost_joints(self.machine):
+            homed = [name for name in arm.joint_names if name not in lost_joints]
             raise HomingIncompleteError(
-                f"homed {', '.join(homed) or 'nothing'}; the position of {', '.join(lost)} is still lost",
+                f"homed {', '.join(homed) or 'nothing'}; the position of {', '.join(lost_joints)} is still lost",
                 advice="home these joints, too, or home(..., rest_at_home=True) if they stand in their home pose",
-                joints=lost,
-                homing=all(arm.homing[arm.joint_names.index(name)] for name in lost),
+                joints=lost_joints,
+                homing=all(arm.homing[arm.joint_names.index(name)] for name in lost_joints),
                 robot_file=arm.path,
             )
         return steps

@@ -92,7 +92,7 @@ class GrblBoard(Board):
         """Settings that are not as the robot file wants them."""
         return [
             {"setting": d.number, "what": d.meaning, "found": d.actual, "wanted": d.expected, "serious": d.serious}
-            for d in self.machine.wrong()
+            for d in self.machine.setting_differences()
         ]
 
     def write_settings(self) -> None:

@@ -128,33 +128,33 @@ def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Differe
     """
     printer = actual.get("printer")
     printer = printer if isinstance(printer, Mapping) else {}
-    wrong = []
+    differing = []
     kinematics = printer.get("kinematics")
     if kinematics != "none":
-        wrong.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
-    for option, least in (("max_velocity", TIME_RATE), ("max_accel", MAX_ACCEL)):
+        differing.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
+    for option, minimum in (("max_velocity", TIME_RATE), ("max_accel", MAX_ACCEL)):
         value = printer.get(option)
-        if not isinstance(value, int | float) or value < least:
-            wrong.append(Difference(f"[printer] {option}", _value_text(value), f"at least {least:g}"))
+        if not isinstance(value, int | float) or value < minimum:
+            differing.append(Difference(f"[printer] {option}", _value_text(value), f"at least {minimum:g}"))
     for axis in axes:
         name = f"[manual_stepper {axis.section}]"
         section = actual.get(name[1:-1])
         if not isinstance(section, Mapping):
-            wrong.append(Difference(name, None, f"one for motor {axis.name}"))
+            differing.append(Difference(name, None, f"one for motor {axis.name}"))
             continue
         steps = _steps_per_unit(section)
         if steps is None or not math.isclose(steps, axis.steps, rel_tol=1e-9):
             steps_text = None if steps is None else f"{steps:.9g}"
-            wrong.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
-    return wrong
+            differing.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
+    return differing
 
 
 def _steps_per_unit(section: Mapping[str, Any]) -> float | None:
     """Steps a unit of a section, None if it does not tell."""
     try:
         ratio = math.prod(float(a) / float(b) for a, b in section.get("gear_ratio") or ())
-        full = float(section.get("full_steps_per_rotation", 200))
-        return full * float(section["microsteps"]) * ratio / float(section["rotation_distance"])
+        full_steps = float(section.get("full_steps_per_rotation", 200))
+        return full_steps * float(section["microsteps"]) * ratio / float(section["rotation_distance"])
     except (KeyError, TypeError, ValueError, OverflowError, ZeroDivisionError):
         return None
 

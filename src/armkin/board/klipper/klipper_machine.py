@@ -77,7 +77,7 @@ class KlipperMachine(StepperArm):
         """What `armkin status` tells besides the position."""
         return {"firmware": f"Klipper {self.version}", "state": self.state, "inputs": "", **super().report()}
 
-    def wrong(self) -> list[Difference]:
+    def setting_differences(self) -> list[Difference]:
         """Options of printer.cfg that are not as the robot file wants them."""
         return differences(self.axes, self.settings)
 
@@ -88,9 +88,11 @@ class KlipperMachine(StepperArm):
         self._read()
         if self.state != "ready":
             raise LinkError(f"Klipper is not ready, it says {self.state}: {self._message}")
-        if wrong := self.wrong():
-            more = f", and {len(wrong) - 1} more" if len(wrong) > 1 else ""
-            raise LinkError(f"printer.cfg does not fit {self.arm.name}: {wrong[0]}{more}; armkin setup prints it")
+        if differences := self.setting_differences():
+            count_text = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
+            raise LinkError(
+                f"printer.cfg does not fit {self.arm.name}: {differences[0]}{count_text}; armkin setup prints it"
+            )
         self._settle()
 
     def vouch(self, counts: Sequence[int]) -> None:
@@ -131,17 +133,17 @@ class KlipperMachine(StepperArm):
         lines = trajectory_to_g1_lines.Lines(job, self.axes)
         source = iter(lines)
         self.api.run(trajectory_to_g1_lines.HEAD)
-        began, stopping = self.port.now(), False
+        start_time, stopping = self.port.now(), False
         while chunk := [line for _, line in zip(range(_CHUNK_LINES), source, strict=False)]:
             self.api.send("gcode/script", {"script": "\n".join(chunk)})
-            ahead = began + lines.sent - _SPARE_TIME - ramp
-            while self.api.count_waiting() > _MAX_PENDING or (not stopping and self.port.now() < ahead):
+            send_time = start_time + lines.sent - _SPARE_TIME - ramp
+            while self.api.count_waiting() > _MAX_PENDING or (not stopping and self.port.now() < send_time):
                 if not stopping and self._stop():
                     stopping = True
                     lines.brake(ramp)
                 self.api.pump(0.01)
-                report(min(self.port.now() - began, job.duration))
-                if self.port.now() - began > lines.sent + _REST_TIMEOUT:
+                report(min(self.port.now() - start_time, job.duration))
+                if self.port.now() - start_time > lines.sent + _REST_TIMEOUT:
                     raise LinkError(
                         f"Klipper on {self.port.name} has left {self.api.count_waiting()} requests unanswered"
                     )
@@ -167,9 +169,9 @@ class KlipperMachine(StepperArm):
 
     def _read(self) -> None:
         """Read where the arm stands: known while that is where armkin left it."""
-        why = self._read_state() or self._record.differs(self._marks)
+        reason = self._read_state() or self._record.differs(self._marks)
         self._loss_reason = (
-            why or self._record.moved_text(self.counts()) or why_impossible(self.arm, self.counts()) or ""
+            reason or self._record.moved_text(self.counts()) or why_impossible(self.arm, self.counts()) or ""
         )
 
     def _read_state(self) -> str:

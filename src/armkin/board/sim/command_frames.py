@@ -131,7 +131,7 @@ class Commands:
     def _check_rates(self, rate: Sequence[int], *, jogging: bool) -> None:
         """Raise unless axes may move at these rates without a plan."""
         moving_axes = [i for i, r in enumerate(rate) if r]
-        slow = jogging and not all(self._axis_known(i) for i in moving_axes)
+        is_slow = jogging and not all(self._axis_known(i) for i in moving_axes)
         for i in moving_axes:
             servo = self._setup.servo(i)
             if not self._setup.used(i) or (servo and not jogging):
@@ -140,9 +140,9 @@ class Commands:
                 raise RefusedError(Error.LOST, i)
             if not self._setup.powered(i):
                 raise RefusedError(Error.DISABLED, i)
-            most = self._setup.image.axes[i].max_rate
-            most = max(most // 8, 1) if slow else most
-            if abs(rate[i]) > min(most, 2**31 - 1):  # the way back has to be a rate, too
+            max_rate = self._setup.image.axes[i].max_rate
+            max_rate = max(max_rate // 8, 1) if is_slow else max_rate
+            if abs(rate[i]) > min(max_rate, 2**31 - 1):  # the way back has to be a rate, too
                 raise RefusedError(Error.RATE, i)
 
     def _home(self, payload: bytes) -> None:
@@ -151,16 +151,23 @@ class Commands:
         if len(payload) != 15 + 4 * n:
             raise RefusedError(Error.LENGTH)
         self._require_state(State.IDLE, abort=True)
-        switch, flags, slow, backoff, travel, time, *rate = struct.unpack_from(f"<BBBIIH{n}i", payload, 2)
-        far = backoff > 2**30 or travel > 2**30
-        if not any(rate) or switch >= len(self._board.switches) or flags > 1 or not slow or not backoff or far:
+        switch, flags, slow_share, backoff, travel, time, *rate = struct.unpack_from(f"<BBBIIH{n}i", payload, 2)
+        too_far = backoff > 2**30 or travel > 2**30
+        if (
+            not any(rate)
+            or switch >= len(self._board.switches)
+            or flags > 1
+            or not slow_share
+            or not backoff
+            or too_far
+        ):
             raise RefusedError(Error.VALUE)
         self._check_rates(rate, jogging=False)
         self._motors.home(
             Search(
                 switch=switch,
                 closed=bool(flags),
-                slow=slow / 256,
+                slow=slow_share / 256,
                 backoff=backoff,
                 travel=travel,
                 time=time / 10,

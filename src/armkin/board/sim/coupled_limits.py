@@ -19,14 +19,18 @@ class Rows:
     def check(self, counts: list[int], known_axes: int) -> None:
         """Raise RefusedError if a segment that ends at `counts` takes a joint out of its limits."""
         for r, row in enumerate(self._image.rows):
-            after, slack = row_value(row, counts), sum(map(abs, row.weight))
+            end_value, slack = row_value(row, counts), sum(map(abs, row.weight))
             low, high = min(row.lower, self._nearest[r] - slack), max(row.upper, self._nearest[r] + slack)
-            outside = (after < row.lower and after < low) or (after > row.upper and after > high)
-            if outside and all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w):
+            is_outside = (end_value < row.lower and end_value < low) or (end_value > row.upper and end_value > high)
+            if is_outside and all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w):
                 raise RefusedError(Error.LIMIT_JOINT, r)
-            nearer = after > self._nearest[r] if after < row.lower else after <= row.upper or after < self._nearest[r]
-            if nearer:
-                self._nearest[r] = after
+            is_nearest = (
+                end_value > self._nearest[r]
+                if end_value < row.lower
+                else end_value <= row.upper or end_value < self._nearest[r]
+            )
+            if is_nearest:
+                self._nearest[r] = end_value
 
 
 def leads_to_switch(guard: GuardImage, rates: Sequence[float]) -> bool:

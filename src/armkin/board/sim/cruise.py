@@ -19,7 +19,7 @@ class Cruise:
     def aim(self, rate: list[int]) -> None:
         """Begin a vector, at rest."""
         self.rate, self.share = rate, 0.0
-        self.far = 0.0  # counts made along the vector by its fastest axis
+        self.travel = 0.0  # counts made along the vector by its fastest axis
         self._done = [0.0] * len(rate)
 
     @property
@@ -38,11 +38,11 @@ class Cruise:
 
     def glide(self, target: float) -> None:
         """Move for one millisecond, with the share approaching `target`."""
-        before, step = self.share, self.slope * _TICK_TIME
-        self.share = min(before + step, target) if target > before else max(before - step, target)
-        moved = (before + self.share) / 2 * _TICK_TIME
-        self.far += moved * max(abs(r) for r in self.rate)
-        total = [d + r * moved for d, r in zip(self._done, self.rate, strict=True)]
+        old_share, step = self.share, self.slope * _TICK_TIME
+        self.share = min(old_share + step, target) if target > old_share else max(old_share - step, target)
+        mean_time = (old_share + self.share) / 2 * _TICK_TIME
+        self.travel += mean_time * max(abs(r) for r in self.rate)
+        total = [d + r * mean_time for d, r in zip(self._done, self.rate, strict=True)]
         steps = [int(t) - int(d) for t, d in zip(total, self._done, strict=True)]
         self._done = total
         self.axes.settle(steps)
@@ -51,8 +51,8 @@ class Cruise:
         """Whether the arm stays within its limits if it brakes after the next millisecond."""
         image, base, known_axes = self.axes.image, self.axes.base, self.axes.known
         share = min(self.share + self.slope * _TICK_TIME, 1.0)
-        ahead = share * _TICK_TIME + share * share / (2 * self.slope) + share * _TICK_TIME
-        stop_counts = [b + round(r * ahead + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
+        stop_time = share * _TICK_TIME + share * share / (2 * self.slope) + share * _TICK_TIME
+        stop_counts = [b + round(r * stop_time + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
         for i, axis in enumerate(image.axes):
             if (
                 self.rate[i]

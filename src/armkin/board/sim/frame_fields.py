@@ -38,16 +38,16 @@ def read_batch(payload: bytes) -> MotionFields:
     mask, flags, n = struct.unpack_from("<HBB", payload, 2)
     axes = axes_of(mask)
     k = len(axes)
-    wide = bool(flags & protocol.MOTION_WIDE)
-    size = protocol.segment_size(k, wide=wide)
-    gentle = flags >> protocol.MOTION_GENTLE
-    if n == 0 or gentle >= protocol.GENTLE_PARTS or len(payload) != 6 + 8 * k + n * size:
+    is_wide = bool(flags & protocol.MOTION_WIDE)
+    size = protocol.segment_size(k, wide=is_wide)
+    gentleness = flags >> protocol.MOTION_GENTLE
+    if n == 0 or gentleness >= protocol.GENTLE_PARTS or len(payload) != 6 + 8 * k + n * size:
         raise RefusedError(Error.LENGTH)
     ends = struct.unpack_from(f"<{2 * k}i", payload, 6)
     pieces = (payload[offset : offset + size] for offset in range(6 + 8 * k, len(payload), size))
-    segments = [protocol.read_segment(piece, axes, wide=wide) for piece in pieces]
+    segments = [protocol.read_segment(piece, axes, wide=is_wide) for piece in pieces]
     return MotionFields(
-        axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END), 1 - gentle / protocol.GENTLE_PARTS
+        axes, ends[:k], ends[k:], segments, bool(flags & protocol.MOTION_END), 1 - gentleness / protocol.GENTLE_PARTS
     )
 
 
@@ -81,8 +81,8 @@ def _weights_valid(weights: Sequence[int], axes: Sequence[AxisImage]) -> bool:
 def _row_valid(row: RowImage, axes: Sequence[AxisImage]) -> bool:
     """Whether the bounds of a coupled limit are in order, and its sum fits the board's integers."""
     reach = zip(row.weight, axes, strict=True)
-    most = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
-    return row.lower <= row.upper and most < _MAX_COUNTS
+    max_sum = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
+    return row.lower <= row.upper and max_sum < _MAX_COUNTS
 
 
 def _axis_valid(axis: AxisImage, *, servo: int) -> bool:

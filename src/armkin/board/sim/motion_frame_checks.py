@@ -46,7 +46,7 @@ class Batches:
         """A batch's segment with a rate for every axis; moves `plan` to its end."""
         if not times_valid(s, self._setup.board.min_interval):
             raise RefusedError(Error.INTERVAL, number)
-        rates, before = [0] * len(plan), [p >> 23 for p in plan]
+        rates, start_counts = [0] * len(plan), [p >> 23 for p in plan]
         rate_of = dict(zip(axes, s.rates, strict=True))
         speed.begin(s)
         for axis in range(len(plan)):
@@ -56,8 +56,8 @@ class Batches:
             speed.check(axis, rate)
             rates[axis] = rate
             plan[axis] += s.ticks * rate
-            image, after = self._setup.image.axes[axis], plan[axis] >> 23
-            if axis in rate_of and not limit_rule_holds(image.lower, image.upper, before[axis], after):
+            image, end_count = self._setup.image.axes[axis], plan[axis] >> 23
+            if axis in rate_of and not limit_rule_holds(image.lower, image.upper, start_counts[axis], end_count):
                 raise RefusedError(Error.LIMIT, axis)
         self._rows.check([p >> 23 for p in plan], known_axes)
         return replace(s, rates=tuple(rates))

@@ -12,17 +12,19 @@ _MAX_UINT16 = 0xFFFF
 _MAX_CHANGE = 1 << 23  # budget of a window from which on the acceleration is not checked
 
 
-def times_valid(s: Segment, least: int) -> bool:
-    """Whether all intervals of a segment, and the one after its end, are within `least` and 65535 cycles; a quick one's
-    of 5/4 of `least`."""
-    least += least // 4 if s.quick else 0
-    if s.ticks == 0 or s.interval < least or (s.bend and s.ticks > 1 << (10 if s.quick else 14)):
+def times_valid(s: Segment, min_interval: int) -> bool:
+    """Whether all intervals of a segment, and the one after its end, are within `min_interval` and 65535 cycles.
+
+    The least interval of a quick segment is 5/4 of `min_interval`.
+    """
+    min_interval += min_interval // 4 if s.quick else 0
+    if s.ticks == 0 or s.interval < min_interval or (s.bend and s.ticks > 1 << (10 if s.quick else 14)):
         return False
     turns = s.add * s.last_add < 0 if s.add else s.bend != 0
     return (
         not turns
         and abs(s.last_add + 0.5) < 1 << 23
-        and least <= s.last_interval <= 65535
+        and min_interval <= s.last_interval <= 65535
         and s.interval_after(s.ticks) <= 65535
     )
 
@@ -38,12 +40,12 @@ class Pace(NamedTuple):
 
 def _quarter_velocity(start: int, end: int, windows: int) -> int:
     """A quarter of the velocity in a segment's middle; of a longer one than 50 ms, 25 ms from its end `start`."""
-    half = start >> 1
-    change = (end >> 1) - half
+    half_start = start >> 1
+    change = (end >> 1) - half_start
     if not windows:
-        return (half + (change >> 1)) >> 1
+        return (half_start + (change >> 1)) >> 1
     part = (1 << 23) // windows
-    return (half + (change >> 16) * part + ((change & _MAX_UINT16) * part >> 16)) >> 1
+    return (half_start + (change >> 16) * part + ((change & _MAX_UINT16) * part >> 16)) >> 1
 
 
 class Velocity:
@@ -86,9 +88,9 @@ class Velocity:
 
     def check_rest(self, axis: int) -> None:
         """Raise RefusedError if an axis is too fast to rest now."""
-        behind = self.copy()
-        behind._last_pace, behind._pace = self._pace, Pace(time=self._pace.time)
-        behind._accelerate(axis, 0, 0, 0)
+        at_rest = self.copy()
+        at_rest._last_pace, at_rest._pace = self._pace, Pace(time=self._pace.time)
+        at_rest._accelerate(axis, 0, 0, 0)
 
     @property
     def _time_unit(self) -> float:
@@ -102,23 +104,23 @@ class Velocity:
 
     def _accelerate(self, axis: int, first: int, last: int, rate: int) -> None:
         """See firmware/src/core/batch.c."""
-        (start, left, was), before, pace = self._last_ends[axis], self._last_pace, self._pace
-        between = self._budget(axis, (before.time >> 1) + (pace.time >> 1))
-        if between == _MAX_CHANGE << 16 or not (was or rate):
+        (start, last_end, last_rate), last_pace, pace = self._last_ends[axis], self._last_pace, self._pace
+        budget = self._budget(axis, (last_pace.time >> 1) + (pace.time >> 1))
+        if budget == _MAX_CHANGE << 16 or not (last_rate or rate):
             self._excess[axis] = (0, 0)
             return
         four_intervals = 4 * ((1 << self._bits) // self.board.min_interval)
-        slack = four_intervals + ((abs(left) + abs(last)) >> 2 * self._bits - 37)
+        slack = four_intervals + ((abs(last_end) + abs(last)) >> 2 * self._bits - 37)
         change = abs(last - first)
         if pace.windows:
             bends = pace.windows < _MAX_UINT16 and change >> 8 > self._budget(axis, pace.windows)
         else:
             bends = change > self._budget(axis, pace.time) + slack
-        if bends or abs(first - left) > between + slack:
+        if bends or abs(first - last_end) > budget + slack:
             raise RefusedError(Error.ACCEL, axis)
-        more = _quarter_velocity(first, last, pace.windows) - _quarter_velocity(left, start, before.windows)
-        excess = (0, 0) if before.windows else self._excess[axis]
-        up, down = (max(0, e + m - (between >> 2)) for e, m in zip(excess, (more, -more), strict=True))
-        self._excess[axis] = up, down
-        if max(up, down) > slack >> 2:
+        growth = _quarter_velocity(first, last, pace.windows) - _quarter_velocity(last_end, start, last_pace.windows)
+        excess = (0, 0) if last_pace.windows else self._excess[axis]
+        excess_up, excess_down = (max(0, e + m - (budget >> 2)) for e, m in zip(excess, (growth, -growth), strict=True))
+        self._excess[axis] = excess_up, excess_down
+        if max(excess_up, excess_down) > slack >> 2:
             raise RefusedError(Error.ACCEL, axis)

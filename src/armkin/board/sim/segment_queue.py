@@ -18,12 +18,12 @@ _SLOW_STOP = 0.024  # longest time [s] to a stop at which the arm may stop at th
 def intervals(s: Segment) -> Iterator[int]:
     """Cycles before every tick, as the device adds them up."""
     interval, add = s.interval << 16, s.add * 256
-    more, block = s.growth
+    change, block = s.growth
     for tick in range(1, s.ticks + 1):
         yield interval >> 16
         interval += add >> 8
         if (s.ticks - tick) % block == 0:
-            add += more
+            add += change
 
 
 @dataclass

@@ -80,11 +80,11 @@ class SimBoard:
     def reset(self, power: bool = False) -> None:
         """Reset the board, or cut its power; positions survive a reset at rest and are lost in motion."""
         motors, setup = self.motors, self.setup
-        still = motors.state == State.IDLE
+        at_rest = motors.state == State.IDLE
         motors.cut()
         known_axes, counts = motors.axes.known & ~self.board.servo_mask, motors.axes.base
         retained = (
-            _RetainedState(setup.packed_image(), setup.drivers, known_axes, counts) if still and not power else None
+            _RetainedState(setup.packed_image(), setup.drivers, known_axes, counts) if at_rest and not power else None
         )
         self._boots = 0 if power else self._boots
         cause = 1 if power else 2

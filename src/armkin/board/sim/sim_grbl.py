@@ -145,10 +145,10 @@ class Grbl(SimulatedTime):
             self._rx.append(byte)
 
     def _soft_reset(self) -> None:
-        if moving := not self._is_standing():
+        if in_motion := not self._is_standing():
             self.alarm(3)
         self.boot(power=False)
-        self.state = "Alarm" if moving else "Idle"
+        self.state = "Alarm" if in_motion else "Idle"
 
     def _tell_state(self) -> None:
         self._send(self._report_line())
@@ -313,8 +313,8 @@ class Grbl(SimulatedTime):
             return 22
         modes = self.modes
         saved = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
-        straight = Words(words.codes | {1.0, 94.0}, None, words.values)
-        goal = modes.obey(straight, _machine_position(self.settings, position))
+        line_words = Words(words.codes | {1.0, 94.0}, None, words.values)
+        goal = modes.obey(line_words, _machine_position(self.settings, position))
         feed = modes.feed
         modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = saved
         if goal is not None:
@@ -333,16 +333,16 @@ def _block_to(
     settings: Mapping[int, float], start: Sequence[int], goal: Sequence[float], feed: float, jog: bool
 ) -> Block | None:
     """A block to a goal in units; None: nothing to do."""
-    per = [settings[100 + k] for k in range(len(start))]
-    end = [round(value * p) for value, p in zip(goal, per, strict=True)]
-    change = [(b - a) / s for a, b, s in zip(start, end, per, strict=True)]
+    steps_per_unit = [settings[100 + k] for k in range(len(start))]
+    end = [round(value * p) for value, p in zip(goal, steps_per_unit, strict=True)]
+    change = [(b - a) / s for a, b, s in zip(start, end, steps_per_unit, strict=True)]
     length = math.hypot(*change)
     if length == 0.0:
         return None
     share = [abs(c) / length for c in change]
-    most = min(settings[110 + k] / 60 / s for k, s in enumerate(share) if s)
+    max_speed = min(settings[110 + k] / 60 / s for k, s in enumerate(share) if s)
     accel = min(settings[120 + k] / s for k, s in enumerate(share) if s)
-    return Block(tuple(start), tuple(end), length, feed, most, accel, jog)
+    return Block(tuple(start), tuple(end), length, feed, max_speed, accel, jog)
 
 
 def _version_lines(hal: bool) -> list[str]:

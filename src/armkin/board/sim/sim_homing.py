@@ -43,14 +43,14 @@ class Homing:
 
     def _phases(self, s: Search) -> Iterator[None]:
         """Leave the switch, find its edge fast, back off, find it slowly."""
-        back = [-r for r in s.rate]
+        reverse = [-r for r in s.rate]
         if self._is_pressed(s) and not (
-            yield from self._find_edge(s, back, s.slow, False, 2 * s.backoff, Error.SWITCH)
+            yield from self._find_edge(s, reverse, s.slow, False, 2 * s.backoff, Error.SWITCH)
         ):
             return
         if not (yield from self._find_edge(s, s.rate, 1.0, True, s.travel, Error.TRAVEL)):
             return
-        if not (yield from self._slide(back, 1.0, lambda: self._is_backed_off(s), 2**31, Error.SWITCH)):
+        if not (yield from self._slide(reverse, 1.0, lambda: self._is_backed_off(s), 2**31, Error.SWITCH)):
             return
         if self._is_pressed(s):
             self._fault(Error.SWITCH)
@@ -68,19 +68,19 @@ class Homing:
         self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
     ) -> Generator[None, None, bool]:
         """Move until `finished`, then to rest; returns whether that succeeded."""
-        cruise, fine = self._cruise, True
+        cruise, in_limits = self._cruise, True
         cruise.aim(vector)
         while not cruise.stopped and not finished():
-            if cruise.far > limit or cruise.now > self._until:
+            if cruise.travel > limit or cruise.now > self._until:
                 self._fault(Error.TIME if cruise.now > self._until else error)
-                fine = False
+                in_limits = False
                 break
             cruise.glide(share)
             yield
         while cruise.share > 0:
             cruise.glide(0.0)
             yield
-        if not fine or cruise.stopped:
+        if not in_limits or cruise.stopped:
             return False
         yield  # a millisecond at rest between two motions
         return True
@@ -95,14 +95,14 @@ class Homing:
             self._switch_time = -1.0
         elif self._switch_time < 0:
             self._switch_time, self._switch_counts = present, list(self._cruise.axes.base)
-        steady = self._switch_time >= 0 and present - self._switch_time >= _DEBOUNCE_TIME
-        if steady:
+        is_steady = self._switch_time >= 0 and present - self._switch_time >= _DEBOUNCE_TIME
+        if is_steady:
             self.latch = self._switch_counts
-        return steady
+        return is_steady
 
     def _is_backed_off(self, s: Search) -> bool:
         """Whether braking now ends at the back-off distance."""
         leader = max(range(len(s.rate)), key=lambda i: abs(s.rate[i]))
-        if self._cruise.far == 0:
+        if self._cruise.travel == 0:
             self._beyond = abs(self._cruise.axes.base[leader] - self.latch[leader])
-        return self._cruise.far + self._cruise.braking >= s.backoff + self._beyond
+        return self._cruise.travel + self._cruise.braking >= s.backoff + self._beyond

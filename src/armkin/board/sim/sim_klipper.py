@@ -236,16 +236,16 @@ class Klipper(SimulatedTime):
         self.feed = words.pop("F") * self.factor if "F" in words else self.feed
         start = {"X": self.x, **{name: self.steppers[name].place for name in self.axes}}
         end = self._end_places(start, words)
-        way = {key: end[key] - start[key] for key in end}
-        along = abs(way["X"]) or max(map(abs, way.values()))
-        if along < 1e-9:
+        change = {key: end[key] - start[key] for key in end}
+        length = abs(change["X"]) or max(map(abs, change.values()))
+        if length < 1e-9:
             return
-        allowed = (self.steppers[name].velocity * along / abs(way[name]) for name in self.axes if way[name])
-        seconds = along / min([self.feed / 60, *allowed])
-        speeds = {name: way[name] / seconds for name in self.axes}
-        if way["X"] and self._moves:
+        allowed = (self.steppers[name].velocity * length / abs(change[name]) for name in self.axes if change[name])
+        seconds = length / min([self.feed / 60, *allowed])
+        speeds = {name: change[name] / seconds for name in self.axes}
+        if change["X"] and self._moves:
             self.jumps += sum(abs(v - self._speeds.get(k, 0.0)) > self.steppers[k].corner for k, v in speeds.items())
-        self._speeds = speeds if way["X"] else {}
+        self._speeds = speeds if change["X"] else {}
         self._moves.append(Move(start, end, seconds))
         self.x = end["X"]
         for name in self.axes:

@@ -134,4 +134,4 @@ class Motors:
         self.state = State.IDLE
 
     def _plus_made(self, counts: list[int]) -> list[int]:
-        return [count + made for count, made in zip(counts, self.queue.steps_made(), strict=True)]
+        return [count + steps for count, steps in zip(counts, self.queue.steps_made(), strict=True)]

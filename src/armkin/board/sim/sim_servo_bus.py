@@ -55,16 +55,16 @@ class Servo:
 
     def advance(self, seconds: float) -> None:
         """Let time pass: with its torque on, the shaft moves towards the goal."""
-        moves = self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)
-        if seconds > 0 and not moves and not self.speed:
+        is_moving = self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)
+        if seconds > 0 and not is_moving and not self.speed:
             return  # it stands, and its registers say so
-        before = self.position
-        if moves and seconds > 0:
-            fastest = (abs(self.get(GOAL_SPEED)) or MAX_SPEED) * seconds
+        old_position = self.position
+        if is_moving and seconds > 0:
+            max_travel = (abs(self.get(GOAL_SPEED)) or MAX_SPEED) * seconds
             goal, low, high = (self.get(register) for register in (GOAL_POSITION, MIN_POSITION, MAX_POSITION))
             goal = min(max(goal, low), high) if low or high else goal  # it goes no farther than its own limits
-            self.position += max(-fastest, min(fastest, goal - self.position))
-        self.speed = (self.position - before) / seconds if seconds > 0 else 0.0
+            self.position += max(-max_travel, min(max_travel, goal - self.position))
+        self.speed = (self.position - old_position) / seconds if seconds > 0 else 0.0
         self.set(POSITION, round(self.position))
         self.set(SPEED, round(self.speed))
         self.set(MOVING, int(self.get(TORQUE) == 1 and self.position != self.get(GOAL_POSITION)))

@@ -21,7 +21,7 @@ from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, 
 from armkin.motion.branches.branch_columns import Columns
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import END_ACCURACY, link_branches
-from armkin.motion.branches.route_grid import Way, refine_grid
+from armkin.motion.branches.route_grid import BranchSamples, refine_grid
 from armkin.motion.branches.wrist_turn import ASIDE_SHARE, add_wrist_chains, has_wrist
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.timing.cubic_knots import Knots
@@ -188,10 +188,12 @@ def run_stretches(
     for part in _group_rests(rests, s):
         begin, end, inner = part[0], part[-1], np.array(part[1:-1])
         samples = slice(max(int(np.searchsorted(s, begin, side="right")) - 1, 0), int(np.searchsorted(s, end)) + 1)
-        solved = len(s[samples])  # a route of many turns has more samples, and needs more points
-        number = max(int(grid * (end - begin) / route.length), solved * grid // (2 * _MIN_GRID_POINTS), 60)
-        way = Way(route=route, s=s[samples], q=q[samples], begin=begin, end=end, windows=run.chain.windows, stops=inner)
-        path, deviations = refine_grid(arm, way, number, tolerance)
+        sample_count = len(s[samples])  # a route of many turns has more samples, and needs more points
+        number = max(int(grid * (end - begin) / route.length), sample_count * grid // (2 * _MIN_GRID_POINTS), 60)
+        branch = BranchSamples(
+            route=route, s=s[samples], q=q[samples], begin=begin, end=end, windows=run.chain.windows, stops=inner
+        )
+        path, deviations = refine_grid(arm, branch, number, tolerance)
         _check_deviation(path, deviations + route.largest_detour, pace)
         if stretches:  # consecutive stretches share the posture at rest exactly
             path.q[0] = stretches[-1].end

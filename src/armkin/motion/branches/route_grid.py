@@ -37,7 +37,7 @@ _MOTION_SHARE = 0.7  # share of the grid spaced by joint motion; the rest is spa
 Missed = tuple[float, float] | None  # the greatest distance of a given point from the motion, and where [mm]
 
 
-class Way(NamedTuple):
+class BranchSamples(NamedTuple):
     """A branch along a route between two lengths, at rest at both ends."""
 
     route: Route
@@ -49,29 +49,31 @@ class Way(NamedTuple):
     stops: Array = np.zeros(0)  # (k,) [mm] where it rests on the way
 
 
-def refine_grid(arm: Arm, way: Way, number: int, tolerance: float | None, exact: bool = True) -> tuple[Knots, Array]:
+def refine_grid(
+    arm: Arm, branch: BranchSamples, number: int, tolerance: float | None, exact: bool = True
+) -> tuple[Knots, Array]:
     """Cubics on a grid along a branch, and how far they may leave the route.
 
     The grid has `number` points, and more where an interval may leave the route by more than `tolerance` [mm]; None:
     no refinement. exact: whether a fitted route may use the exact slopes of its targets. Returns the cubics, and a
     bound of the deviation of every interval: (M,) [mm].
     """
-    route = way.route
-    exact = exact and len(route.spans) > 0 and not way.windows
-    points, breaks = _initial_grid(arm, way, number, _MIN_POINTS if exact else _SECTION_POINTS[0])
+    route = branch.route
+    exact = exact and len(route.spans) > 0 and not branch.windows
+    points, breaks = _initial_grid(arm, branch, number, _MIN_POINTS if exact else _SECTION_POINTS[0])
     if exact:
         points, breaks = _grade_grid(points, breaks)
-    resting = _nearest_indices(points[breaks], way.stops)
+    resting = _nearest_indices(points[breaks], branch.stops)
     max_points = _MAX_POINT_FACTOR * len(points)
     for damping in DAMPING:
-        solved, previous = None, None
+        coarser, previous = None, None
         for _ in range(_MAX_ROUNDS):
-            values = _solve_points(arm, way, points, damping, solved)
+            values = _solve_points(arm, branch, points, damping, coarser)
             rests = breaks[resting]
-            exact_path = exact_cubics(arm, route, points, values, rests, solved) if exact else None
+            exact_path = exact_cubics(arm, route, points, values, rests, coarser) if exact else None
             if exact and exact_path is None:
-                return refine_grid(arm, way, number, tolerance, exact=False)
-            path = solved = exact_path or knots_of_samples(points, values, breaks.tolist(), rests.tolist())
+                return refine_grid(arm, branch, number, tolerance, exact=False)
+            path = coarser = exact_path or knots_of_samples(points, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
                 return path, np.zeros(len(path.h))
             deviations = interval_deviations(arm, route, path, previous)
@@ -95,15 +97,15 @@ def _nearest_indices(ordered: Array, values: Array) -> Int:
     return np.asarray(np.where(values - ordered[i - 1] < ordered[i] - values, i - 1, i))
 
 
-def _initial_grid(arm: Arm, way: Way, number: int, min_points: int) -> tuple[Array, Int]:
+def _initial_grid(arm: Arm, branch: BranchSamples, number: int, min_points: int) -> tuple[Array, Int]:
     """Grid points spaced by length and joint motion, and the indices of the breaks among them."""
-    s, a, b = way.s, way.begin, way.end
-    edges = _section_edges(way)
-    motion_by_s = _accumulate_motion(arm, way.q)
+    s, a, b = branch.s, branch.begin, branch.end
+    edges = _section_edges(branch)
+    motion_by_s = _accumulate_motion(arm, branch.q)
     motion = np.interp(edges, s, motion_by_s)
     total_motion = max(float(motion[-1] - motion[0]), 1e-12)
     share = _MOTION_SHARE * np.diff(motion) / total_motion + (1 - _MOTION_SHARE) * np.diff(edges) / (b - a)
-    count = np.maximum((number * share).astype(int), _min_counts(edges, way.stops, number, min_points))
+    count = np.maximum((number * share).astype(int), _min_counts(edges, branch.stops, number, min_points))
     # equal steps of a level that grows with joint motion and length, in every section between two edges
     grid = np.unique(np.concatenate([edges, s[(s > a) & (s < b)]]))
     level = _MOTION_SHARE * np.interp(grid, s, motion_by_s) / total_motion + (1 - _MOTION_SHARE) * grid / (b - a)
@@ -111,15 +113,15 @@ def _initial_grid(arm: Arm, way: Way, number: int, min_points: int) -> tuple[Arr
     begin = np.cumsum(count) - count
     points = np.append(np.interp(divide_spans(level_at_edges, count), level, grid), b)
     points[begin] = edges[:-1]
-    inside = np.diff(np.searchsorted(way.route.spans, points))
-    return _divide_intervals(points, begin[1:], np.where(inside > 1, inside + 1, 1))
+    span_ends = np.diff(np.searchsorted(branch.route.spans, points))
+    return _divide_intervals(points, begin[1:], np.where(span_ends > 1, span_ends + 1, 1))
 
 
-def _section_edges(way: Way) -> Array:
-    """Both ends of the way, and between them the route's breaks and the windows' ends: ascending [mm]."""
-    bends = np.sort(np.concatenate([way.route.breaks, *([window.begin, window.end] for window in way.windows)]))
-    first, last = np.searchsorted(bends, [way.begin + 1e-9, way.end - 1e-9])
-    return np.concatenate([[way.begin], np.unique(bends[first:last]), [way.end]])
+def _section_edges(branch: BranchSamples) -> Array:
+    """Both ends of the branch, and between them the route's breaks and the windows' ends: ascending [mm]."""
+    bends = np.sort(np.concatenate([branch.route.breaks, *([window.begin, window.end] for window in branch.windows)]))
+    first, last = np.searchsorted(bends, [branch.begin + 1e-9, branch.end - 1e-9])
+    return np.concatenate([[branch.begin], np.unique(bends[first:last]), [branch.end]])
 
 
 def _accumulate_motion(arm: Arm, q: Array) -> Array:
@@ -141,10 +143,10 @@ def _min_counts(edges: Array, stops: Array, number: int, min_points: int) -> Int
 def _excess_lengths(arm: Arm, path: Knots, distance: Array, tolerance: float, exact: bool) -> Array:
     """The factor by which each interval without a rest is too long (M,), by its deviation and its chord error."""
     deviations, steps, h = (np.delete(values, path.rests) for values in (distance, _chord_bounds(arm, path), path.h))
-    coarse = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # the error is of second order in h
+    factors = np.sqrt(steps / max(tolerance, _COARSE_STEP))  # the error is of second order in h
     if exact:  # a chord that hardly turns may be longer: 8 steps / h is of first order
-        coarse = np.minimum(coarse, 8 * steps / (h * _MIN_CHORD_TURN))
-    return np.maximum(np.cbrt(deviations / tolerance), coarse)  # the error is of third order in h
+        factors = np.minimum(factors, 8 * steps / (h * _MIN_CHORD_TURN))
+    return np.maximum(np.cbrt(deviations / tolerance), factors)  # the error is of third order in h
 
 
 def _part_counts(excess: Array, exact: bool) -> Int:
@@ -174,26 +176,26 @@ def _divide_intervals(points: Array, breaks: Int, parts: Int) -> tuple[Array, In
     return np.append(divide_spans(points, parts), points[-1]), begin[breaks]
 
 
-def _solve_points(arm: Arm, way: Way, points: Array, damping: float, coarser: Knots | None) -> Array:
+def _solve_points(arm: Arm, branch: BranchSamples, points: Array, damping: float, coarser: Knots | None) -> Array:
     """Joint values that solve the targets at the points; coarser: a solved grid whose points are among them."""
-    route, windows = way.route, way.windows
+    route, windows = branch.route, branch.windows
     # column order, as joints are evaluated one by one
-    values, unsolved = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)
+    values, pending = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)
     if coarser is not None:
         positions = np.searchsorted(points, coarser.s)
-        values[positions], unsolved[positions] = coarser.q, False
+        values[positions], pending[positions] = coarser.q, False
     if coarser is None or windows:
-        guess = np.stack([np.interp(points[unsolved], way.s, way.q[:, j]) for j in range(arm.n)], axis=1)
+        guess = np.stack([np.interp(points[pending], branch.s, branch.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # its cubics are closer than chords of the samples
-        guess, _ = coarser.evaluate(points[unsolved])
-    values[unsolved] = correct_to_route(arm, route.task, guess, route.targets(points[unsolved]), damping)
+        guess, _ = coarser.evaluate(points[pending])
+    values[pending] = correct_to_route(arm, route.task, guess, route.targets(points[pending]), damping)
     for window in windows:
         if window.detour is not None:  # the targets of the route contain the detour
             continue
-        inside = unsolved & (points > window.begin) & (points < window.end)
-        if inside.any():
-            values[inside] = window.joints(
-                arm, route, points[inside], window.turns_to_copy(arm, guess[inside[unsolved]][0])
+        in_window = pending & (points > window.begin) & (points < window.end)
+        if in_window.any():
+            values[in_window] = window.joints(
+                arm, route, points[in_window], window.turns_to_copy(arm, guess[in_window[pending]][0])
             )
     return values
 
@@ -213,12 +215,12 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Kno
     lever, deviations = levers(arm), np.zeros(len(path.h))
     pending = path.s[1:] > path.s[:-1]
     if previous is not None:
-        coarser, distances = previous
-        positions = np.searchsorted(path.s, coarser.s)
-        positions += (np.diff(coarser.s, prepend=-1.0) == 0) & (
-            path.s[np.minimum(positions + 1, len(path.s) - 1)] == coarser.s
+        old_path, distances = previous
+        positions = np.searchsorted(path.s, old_path.s)
+        positions += (np.diff(old_path.s, prepend=-1.0) == 0) & (
+            path.s[np.minimum(positions + 1, len(path.s) - 1)] == old_path.s
         )
-        same_slopes = (path.d.T.take(positions, axis=1) == coarser.d.T).all(axis=0)
+        same_slopes = (path.d.T.take(positions, axis=1) == old_path.d.T).all(axis=0)
         unchanged = np.flatnonzero((positions[1:] == positions[:-1] + 1) & same_slopes[1:] & same_slopes[:-1])
         deviations[positions[unchanged]], pending[positions[unchanged]] = distances[unchanged], False
     intervals = np.flatnonzero(pending)
@@ -240,9 +242,9 @@ def _chord_bounds(arm: Arm, path: Knots) -> Array:
 def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
     """Greatest distance of a given point from the tip's motion on a grid, and where [mm]; None: there is none."""
     s, points = route.given_points
-    inside = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
-    s, points = s[inside], points[inside]
-    worst: Missed = None
+    on_path = (s >= path.s[0] - 1e-9) & (s <= path.s[-1] + 1e-9)
+    s, points = s[on_path], points[on_path]
+    miss: Missed = None
     for i in range(0, len(s), _BLOCK_POINTS):
         nearest, given_points = s[i : i + _BLOCK_POINTS], points[i : i + _BLOCK_POINTS]
         distance = np.full(len(nearest), np.inf)  # least of all steps: in a tight corner the search may move away
@@ -261,10 +263,10 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
             offsets = given_points[row] - position(arm, path.evaluate(s_near)[0])[:, : given_points.shape[1]]
             distance[row] = min(distance[row], float(np.linalg.norm(offsets, axis=1).min()))
         greatest = float(distance[row])
-        if worst is None or greatest > worst[0] * (1 + _SAME_DISTANCE):
-            worst = greatest, float(s[i + int((distance >= greatest * (1 - _SAME_DISTANCE)).argmax())])
-        worst = max(greatest, worst[0]), worst[1]
-    return worst
+        if miss is None or greatest > miss[0] * (1 + _SAME_DISTANCE):
+            miss = greatest, float(s[i + int((distance >= greatest * (1 - _SAME_DISTANCE)).argmax())])
+        miss = max(greatest, miss[0]), miss[1]
+    return miss
 
 
 def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:

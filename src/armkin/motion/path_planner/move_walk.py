@@ -25,16 +25,16 @@ from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviat
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.joint_moves import approach_move, straight_move
 from armkin.motion.path_planner import branch_report
-from armkin.motion.plan.path_plan import Marker, PathPlan
+from armkin.motion.plan.path_plan import Marker, PathPlan, copy_plan
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, joint_way, joint_ways
+from armkin.motion.timing.limit_jerk import Smoothed, join_joint_paths, joint_path
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers, path_pieces
 from armkin.motion.tool_path.dense_points import FIT_SHARE, PLAN_SHARES, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.path_pieces import Piece, Spot, split_target
-from armkin.motion.tool_path.route import ReducedBlends, join_pieces
+from armkin.motion.tool_path.route import join_pieces
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
@@ -65,7 +65,7 @@ class Walk:
     leads: Move | None = None  # the move of the file that goes to a group's first point
     untried_postures: tuple[Array, ...] = ()  # postures of the last target that are still to be tried
     refused: NoSolutionError | None = None  # the error of the first posture that failed
-    saved_state: tuple[dict[str, Any], dict[str, Any]] = ({}, {})  # the walk and its plan before that target
+    before_posture: Walk | None = None  # a copy of the walk before it moved to that target
     current_moves = group = 0, 0  # numbers, from 0, of the first and last move: of this step, of the group
 
     def __init__(self, arm: Arm, file: PathFile, pace: Pace, start: Array, options: PathOptions) -> None:
@@ -103,20 +103,24 @@ class Walk:
 
     def plan_all(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]]) -> PathPlan:
         """The plan of all moves; kinds: the function that carries out each kind of move."""
-        q, number = self.q, 0
+        walk, start, number = self, self.q, 0
         with _errors_of_key(self.file, "start"):
             self._begin()
         while number <= len(self.file.moves):
             try:
-                self._carry_out_move(kinds, number)
+                walk._carry_out_move(kinds, number)
                 number += 1
             except NoSolutionError as error:
-                self.refused = self.refused or error
-                if not self.untried_postures:
-                    raise self.refused from None
-                number = self._restore()
-        self.plan.approach = approach_move(self.arm, q, self.begun, self.pace.speed, self.pace.accel, self.pace.jerk)
-        return self.plan.set_motion(self.begun, self.stretches, self.markers)
+                walk.refused = walk.refused or error
+                saved, postures, refused = walk.before_posture, walk.untried_postures, walk.refused
+                if saved is None or not postures:
+                    raise refused from None
+                walk = _copy_walk(saved)
+                walk.before_posture, walk.untried_postures, walk.refused = saved, postures, refused
+                number = walk.current_moves[0]
+        plan, pace = walk.plan, self.pace
+        plan.approach = approach_move(self.arm, start, walk.begun, pace.speed, pace.accel, pace.jerk)
+        return plan.set_motion(walk.begun, walk.stretches, walk.markers)
 
     def _carry_out_move(self, kinds: Mapping[str, Callable[[Walk, Move, Any], None]], number: int) -> None:
         """Carry out a move; the number after the last one closes the group that is still open."""
@@ -137,21 +141,12 @@ class Walk:
         postures = self.untried_postures or _postures(self, self.goal, self.goal_branch)
         self.goal_branch, self.untried_postures = None, postures[1:]
         if self.untried_postures:
-            self.saved_state = {}, {}
-            self.saved_state = _copy_state(vars(self)), _copy_state(vars(self.plan))
+            self.before_posture = None
+            self.before_posture = _copy_walk(self)
         self.append_joint_move(postures[0], self.leads)
         for kind, value in self.pauses.get(0, ()):
             self.emit_event(kind, value)
         self.goal = None
-
-    def _restore(self) -> int:
-        """Return to the state before the last posture was chosen, and give the number of that move."""
-        untried, refused, (state, plan) = self.untried_postures, self.refused, self.saved_state
-        vars(self).update(
-            {**_copy_state(state), "untried_postures": untried, "refused": refused, "saved_state": self.saved_state}
-        )
-        vars(self.plan).update(_copy_state(plan))
-        return self.current_moves[0]
 
     def _begin(self) -> None:
         """Set the path's first posture: the arm's, the file's joint values, or a point whose branch is chosen later."""
@@ -281,13 +276,13 @@ class Walk:
         begins = {k: round(float(route.ends[number_of_curve[k]]), 6) for k in self.pauses if k in number_of_curve}
         events = {begin: self.pauses[k] for k, begin in begins.items()}
         for curve in curves:
-            knots = joint_way(curve)
+            knots = joint_path(curve)
             for kind, value in events.pop(round(float(knots.s[0]), 6), ()):
                 self.emit_event(kind, value)
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        _note_deviation(self.plan, route, joint_ways(curves), misses)
+        _note_deviation(self.plan, route, join_joint_paths(curves), misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -312,7 +307,7 @@ def _timed_curves(
     for share in PLAN_SHARES:
         tight_pace = replace(pace, tolerance=share * pace.tolerance)
         curves = run_stretches(arm, route, s, run, near, tight_pace, fixed=fixed)
-        misses = largest_miss(arm, route, joint_ways(curves))
+        misses = largest_miss(arm, route, join_joint_paths(curves))
         largest = 0.0 if misses is None else misses[0]
         if largest <= pace.tolerance:
             return curves, misses
@@ -363,9 +358,13 @@ def _no_posture(solutions: Solutions, goal: Spot, branch_name: str | None, clear
     return NoSolutionError(f"{point} has no solution within the limits{on_branch}: nothing was moved")
 
 
-def _copy_state(state: dict[str, Any]) -> dict[str, Any]:
-    """A copy of a state in which lists are copied, too."""
-    return {key: copy(v) if isinstance(v, list | dict | ReducedBlends) else v for key, v in state.items()}
+def _copy_walk(walk: Walk) -> Walk:
+    """A copy of a walk and its plan; the moves that follow change the lists of one of both only."""
+    twin = copy(walk)
+    twin.stretches, twin.markers = walk.stretches.copy(), walk.markers.copy()
+    twin.pieces, twin.blends, twin.pauses = walk.pieces.copy(), walk.blends.copy(), walk.pauses.copy()
+    twin.plan = copy_plan(walk.plan)
+    return twin
 
 
 def _task_or_none(arm: Arm, file: PathFile, name: str | None) -> Task | None:

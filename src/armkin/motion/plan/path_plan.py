@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, joint_way
+from armkin.motion.timing.limit_jerk import Smoothed, joint_path
 from armkin.motion.timing.trajectory import Stretch, Trajectory, group_numbers
 from armkin.motion.tool_path.route import ReducedBlends
 
@@ -252,7 +253,7 @@ class PathPlan:
             UsageError: no stretch of that number lies on the tool's way.
         """
         stretch, base = self._stretch(number)
-        s = joint_way(stretch).s
+        s = joint_path(stretch).s
         return base + float(s[0]), base + float(s[-1])
 
     def grid(self, number: int) -> Array:
@@ -267,7 +268,7 @@ class PathPlan:
         Raises:
             UsageError: no stretch of that number lies on the tool's way.
         """
-        return joint_way(self._stretch(number)[0]).q
+        return joint_path(self._stretch(number)[0]).q
 
     def _stretch(self, number: int) -> tuple[Curve | Smoothed, float]:
         """A stretch on the tool's way, and where it begins on it [mm]."""
@@ -300,6 +301,14 @@ class PathPlan:
         if np.isfinite(self.arm.max_jerk).all() and jerk.any():
             shares["jerk"] = jerk / self.arm.max_jerk
         return shares
+
+
+def copy_plan(plan: PathPlan) -> PathPlan:
+    """A copy of an unfinished plan: moves that are added to one of both leave the other as it is."""
+    lists: dict[str, Any] = {
+        name: copy(value) for name, value in vars(plan).items() if isinstance(value, list | dict | ReducedBlends)
+    }
+    return replace(plan, **lists)
 
 
 def _worst_conditioned(arm: Arm, q: Array) -> NDArray[np.intp]:

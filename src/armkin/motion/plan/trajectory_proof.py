@@ -12,7 +12,7 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.keep_out.clearance import hits, whole_arm
-from armkin.keep_out.motion_geometry import Cubics, Way
+from armkin.keep_out.motion_geometry import Cubics, JointMotion
 from armkin.keep_out.motion_proof import Proof, prove_motion
 from armkin.keep_out.motion_proof import hit_samples as find_hits
 from armkin.model import units
@@ -50,7 +50,7 @@ class TrajectoryProof:
     postures: int
 
 
-class _SmoothedWay:
+class _SmoothedMotion:
     """A smoothed curve as the geometry of a motion, its cells as long as the grid intervals of the curve."""
 
     def __init__(self, smoothed: Smoothed) -> None:
@@ -106,7 +106,7 @@ def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> Trajecto
     allowed, nearest = None, None
     escaping: tuple[int, ...] = ()
     for first, geometry in _geometries(trajectory):
-        full_geometry = _UnlockedWay(arm, geometry)
+        full_geometry = _UnlockedMotion(arm, geometry)
         proof = prove_motion(bodies, full_geometry, tight=tight, ignored_pairs=allowed)
         postures += proof.postures
         if allowed is None:
@@ -195,38 +195,40 @@ def hit_text(arm: Arm, q: Array) -> str:
 
 
 @dataclass(frozen=True)
-class _UnlockedWay:
+class _UnlockedMotion:
     """The geometry of a motion in the joints of the whole arm, with the held ones at rest."""
 
     arm: Arm
-    way: Way
+    motion: JointMotion
 
     @property
     def cells(self) -> int:
         """How many cells the way has."""
-        return self.way.cells
+        return self.motion.cells
 
     def joints_at(self, place: Array) -> Array:
         """Joint values at places along the way."""
-        return whole_arm(self.arm, self.way.joints_at(place))[1]
+        return whole_arm(self.arm, self.motion.joints_at(place))[1]
 
     def variation(self, begin: Array, end: Array) -> Array:
         """How far each joint of the whole arm goes between two places."""
-        arm, travel = self.arm, self.way.variation(begin, end)
+        arm, travel = self.arm, self.motion.variation(begin, end)
         while arm.whole is not None:
             arm, held = arm.whole
             travel = unlock(arm, dict.fromkeys(held, 0.0), travel)
         return travel
 
 
-def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
+def _geometries(trajectory: Trajectory) -> list[tuple[int, JointMotion]]:
     """The geometry of the stretches, consecutive cubics as one; each with the number of its first stretch."""
-    geometries: list[tuple[int, Way]] = []
+    geometries: list[tuple[int, JointMotion]] = []
     numbered = enumerate(trajectory.stretches)
     for smooth, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
         part = list(group)
         if smooth:
-            geometries += [(number, _SmoothedWay(stretch)) for number, stretch in part if isinstance(stretch, Smoothed)]
+            geometries += [
+                (number, _SmoothedMotion(stretch)) for number, stretch in part if isinstance(stretch, Smoothed)
+            ]
         else:
             geometries.append(
                 (part[0][0], Cubics(np.concatenate([_control_points(stretch) for _, stretch in part], axis=1)))
@@ -235,11 +237,17 @@ def _geometries(trajectory: Trajectory) -> list[tuple[int, Way]]:
 
 
 def _proof_on_trajectory(
-    trajectory: Trajectory, held: Guard, first: int, proof: Proof, escaping: tuple[int, ...], postures: int, way: Way
+    trajectory: Trajectory,
+    held: Guard,
+    first: int,
+    proof: Proof,
+    escaping: tuple[int, ...],
+    postures: int,
+    motion: JointMotion,
 ) -> TrajectoryProof:
     """Convert a proof of a part to stretches, joint values and names of the trajectory."""
     stretch, cell = first, proof.place
-    if isinstance(way, Cubics):
+    if isinstance(motion, Cubics):
         sizes = [_cell_count(later) for later in trajectory.stretches[first:]]
         while cell >= sizes[stretch - first] and stretch + 1 < len(trajectory.stretches):
             if not isinstance(trajectory.stretches[stretch + 1], Straight | Curve):
@@ -247,7 +255,7 @@ def _proof_on_trajectory(
             cell -= sizes[stretch - first]
             stretch += 1
     body, keep_out = ("", "") if proof.pair is None else held.pair_names(proof.pair)
-    joints = way.joints_at(np.array([proof.place]))[0]
+    joints = motion.joints_at(np.array([proof.place]))[0]
     pairs = tuple(held.pair_names(k) for k in escaping)
     return TrajectoryProof(
         free=proof.free,
@@ -271,7 +279,7 @@ def hit_time(trajectory: Trajectory, hit: TrajectoryProof) -> float:
     stretch = trajectory.stretches[hit.stretch]
     begin = float(trajectory.begins[hit.stretch])
     if isinstance(stretch, Smoothed):
-        return begin + min(hit.cell / _SmoothedWay(stretch).cells, 1.0) * stretch.duration
+        return begin + min(hit.cell / _SmoothedMotion(stretch).cells, 1.0) * stretch.duration
     if isinstance(stretch, Curve):
         times = stretch.times
         i = min(int(hit.cell), len(times) - 2)

@@ -97,14 +97,14 @@ class Smoothed:
         return np.asarray(change / self.window)
 
 
-def joint_way(stretch: Curve | Smoothed) -> Knots:
+def joint_path(stretch: Curve | Smoothed) -> Knots:
     """The joint path of a curve, or of the curve that was smoothed."""
     return stretch.path if isinstance(stretch, Curve) else stretch.curve.path
 
 
-def joint_ways(stretches: Sequence[Curve | Smoothed]) -> Knots:
+def join_joint_paths(stretches: Sequence[Curve | Smoothed]) -> Knots:
     """The joint paths of stretches in order as one, with a rest between each two."""
-    paths = [joint_way(stretch) for stretch in stretches]
+    paths = [joint_path(stretch) for stretch in stretches]
     if len(paths) == 1:
         return paths[0]
     return Knots(*(np.concatenate([getattr(path, part) for path in paths]) for part in ("s", "q", "d")))
