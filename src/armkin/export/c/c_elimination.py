@@ -60,7 +60,7 @@ def _is_read(pencil: Pencil) -> bool:
 
 def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
     """The pencils for each kind of poses; the first two are special for the kind, if C can read them."""
-    special_pencils = [elimination.of_kind(kind)[:OWN_PENCILS] for kind in Kind]
+    special_pencils = [elimination.pencils_of_kind(kind)[:OWN_PENCILS] for kind in Kind]
     usual = elimination.plans[:passes]
     return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in special_pencils]
 

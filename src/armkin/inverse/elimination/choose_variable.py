@@ -58,7 +58,7 @@ class Elimination:
         """Whether the completeness argument of `method`'s text holds: a regular pencil was found."""
         return self.score < HEALTHY
 
-    def of_kind(self, kind: Kind) -> tuple[Pencil, ...]:
+    def pencils_of_kind(self, kind: Kind) -> tuple[Pencil, ...]:
         """The pencils of poses of a kind."""
         if kind not in self._known:
             self._known[kind] = _of_special_poses(self, kind)
@@ -69,15 +69,15 @@ class Elimination:
         return {Kind.PLAIN: self.plans}
 
 
-def pose_kinds(closed: Loop, goal: Array) -> Int:
+def pose_kinds(loop: Loop, goal: Array) -> Int:
     """The `Kind` of poses (N, 4, 4) of the loop's chain, (N,): all but parallel counts as parallel."""
     kind = np.zeros(len(goal), np.int64)
-    if closed.prismatic[[0, 5]].any():
+    if loop.prismatic[[0, 5]].any():
         return kind
     x, y = goal[:, 0, 2], goal[:, 1, 2]  # direction of axis 6; axis 1 is z
     sine = np.hypot(x, y)
-    apart = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, tol.TINY)
-    kind[apart < tol.BESIDE_SPECIAL] = Kind.MEETING
+    distance = np.abs(goal[:, 0, 3] * y - goal[:, 1, 3] * x) / np.maximum(sine, tol.TINY)
+    kind[distance < tol.BESIDE_SPECIAL] = Kind.MEETING
     kind[sine < tol.BESIDE_SPECIAL] = Kind.PARALLEL
     return kind
 
@@ -89,47 +89,47 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
         link: (7, 4, 4) [mm].
         prismatic: (6,): Z is a shift along z instead of a turn about it.
     """
-    closed = closed_loop.close_loop(link, prismatic)
+    loop = closed_loop.close_loop(link, prismatic)
     if np.sum(prismatic) >= 3:
-        return Elimination(closed, (), -np.inf)
+        return Elimination(loop, (), -np.inf)
     rng = np.random.default_rng(5)
     q = rng.uniform(-np.pi, np.pi, (SAMPLES, 6))
     q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
-    goal, size = sample_poses(closed, q)
+    goal, size = sample_poses(loop, q)
     # Collinear axes, say: no solution is isolated and no role can do better.
     redundant = bool(np.all(size < tol.RANK))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
     for slot, hidden in _SEARCH:
-        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden)]
+        rated += [_rate(loop, role, q, goal) for role in roles(loop.prismatic, slot, hidden)]
         if _enough_roles(rated, redundant, len(hidden) > 1):
             break
     rated.sort(key=lambda rating: rating.cost)
     if not redundant and (rated[0].error >= HEALTHY or rated[0].left_open > OPEN_PART):  # beside a spherical wrist, say
         for slot, hidden in _WIDE_SEARCH:
-            rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
+            rated += [_rate(loop, role, q, goal) for role in roles(loop.prismatic, slot, hidden, wide=True)]
         rated.sort(key=lambda rating: rating.cost)
-    return Elimination(closed, _pencil_sequence(closed, rated), rated[0].error)
+    return Elimination(loop, _pencil_sequence(loop, rated), rated[0].error)
 
 
-def sample_poses(closed: Loop, q: Array) -> tuple[Array, Array]:
+def sample_poses(loop: Loop, q: Array) -> tuple[Array, Array]:
     """Poses (N, 4, 4) of the loop's chain at q (N, 6), and their Jacobians' smallest singular values (N,)."""
-    frame, joints = tip(closed.chain, closed.prismatic, np.ascontiguousarray(q.T))
+    frame, joints = tip(loop.chain, loop.prismatic, np.ascontiguousarray(q.T))
     goal = np.tile(np.eye(4), (len(q), 1, 1))
     goal[:, :3] = np.moveaxis(frame, -1, 0)
-    size = np.linalg.svd(jacobian(frame, joints, closed.prismatic), compute_uv=False)
+    size = np.linalg.svd(jacobian(frame, joints, loop.prismatic), compute_uv=False)
     return goal, np.asarray(size[:, -1], np.float64)
 
 
-def _pencil_sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
+def _pencil_sequence(loop: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
     """The pencils of all passes, from ratings in their order."""
     first = rated[0].pencil
     alternatives = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
     hidden_joint = first.hidden_joint
     alternatives.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
-    again = build_pencil(first.role, closed.links, closed.prismatic, PSI[1])
-    plans = [first, *alternatives[:1], again, *alternatives[1:]]
+    other_offset = build_pencil(first.role, loop.links, loop.prismatic, PSI[1])
+    plans = [first, *alternatives[:1], other_offset, *alternatives[1:]]
     while len(plans) < len(tol.SHAKES):
         plans.append(plans[-2])
     return tuple(plans[: len(tol.SHAKES)])
@@ -137,42 +137,42 @@ def _pencil_sequence(closed: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
 
 def _of_special_poses(elimination: Elimination, kind: Kind) -> tuple[Pencil, ...]:
     """Pencils for poses of a kind: those of all others if they do, else the best of these and of wide ones."""
-    closed = elimination.loop
-    q = _special_postures(closed, kind)
+    loop = elimination.loop
+    q = _special_postures(loop, kind)
     if len(q) < SAMPLES:  # the arm cannot stand there
         return elimination.plans
-    goal = sample_poses(closed, q)[0]
-    usual = list({id(pencil): pencil for pencil in elimination.plans}.values())
-    rated = [_rate(closed, pencil.role, q, goal) for pencil in usual if pencil.psi == PSI[0]]
+    goal = sample_poses(loop, q)[0]
+    plain_pencils = list({id(pencil): pencil for pencil in elimination.plans}.values())
+    rated = [_rate(loop, pencil.role, q, goal) for pencil in plain_pencils if pencil.psi == PSI[0]]
     if rated[0].error < HEALTHY:
         return elimination.plans
     for slot, hidden in _WIDE_SEARCH:
-        rated += [_rate(closed, role, q, goal) for role in roles(closed.prismatic, slot, hidden, wide=True)]
+        rated += [_rate(loop, role, q, goal) for role in roles(loop.prismatic, slot, hidden, wide=True)]
         if len([rating for rating in rated if rating.error < EXCELLENT]) >= 3:
             break
     rated.sort(key=lambda rating: rating.cost)
-    return _pencil_sequence(closed, rated)
+    return _pencil_sequence(loop, rated)
 
 
-def _special_postures(closed: Loop, kind: Kind) -> Array:
+def _special_postures(loop: Loop, kind: Kind) -> Array:
     """Regular postures (N, 6) at random poses of a kind, at most `SAMPLES`."""
     rng = np.random.default_rng(7)
     count = SAMPLES * STARTS
     q = rng.uniform(-np.pi, np.pi, (2, count, 6))
-    q[:, :, closed.prismatic] /= np.pi
-    goal = sample_poses(closed, q[0])[0]
+    q[:, :, loop.prismatic] /= np.pi
+    goal = sample_poses(loop, q[0])[0]
     if kind is Kind.PARALLEL:
         c, s = np.cos(q[0, :, 0]), np.sin(q[0, :, 0])
-        up = np.where(rng.random(count) < 0.5, 1.0, -1.0)
+        axis_sign = np.where(rng.random(count) < 0.5, 1.0, -1.0)
         goal[:, :3, :3] = 0.0
-        goal[:, 0, 0], goal[:, 1, 0], goal[:, 2, 2] = c, s, up
-        goal[:, 0, 1], goal[:, 1, 1] = -s * up, c * up
+        goal[:, 0, 0], goal[:, 1, 0], goal[:, 2, 2] = c, s, axis_sign
+        goal[:, 0, 1], goal[:, 1, 1] = -s * axis_sign, c * axis_sign
     else:
-        along = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
-        goal[:, :2, 3] = along * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)
-    polished = refine(closed.chain, closed.prismatic, q[1], goal, 20, damped=True)
-    good = (polished.residual < tol.ELIMINATED) & (polished.weakness < STEEP)
-    return polished.q[good][:SAMPLES]
+        radial = goal[:, :2, 2] / np.linalg.norm(goal[:, :2, 2], axis=1, keepdims=True)
+        goal[:, :2, 3] = radial * np.linalg.norm(goal[:, :2, 3], axis=1, keepdims=True)
+    polished = refine(loop.chain, loop.prismatic, q[1], goal, 20, damped=True)
+    is_regular = (polished.residual < tol.ELIMINATED) & (polished.weakness < STEEP)
+    return polished.q[is_regular][:SAMPLES]
 
 
 class _Rating(NamedTuple):
@@ -196,26 +196,26 @@ _WIDE_SEARCH = _SEARCH[:6]
 def _enough_roles(rated: list[_Rating], redundant: bool, last: bool) -> bool:
     """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
     quick ones are all known, any that is healthy."""
-    sound = [one for one in rated if one.error < EXCELLENT and one.left_open < OPEN_PART and one.pencil.size <= 16]
+    sound = [r for r in rated if r.error < EXCELLENT and r.left_open < OPEN_PART and r.pencil.size <= 16]
     if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
         return True
     tried_all = last or any(rating.pencil.role.slot == 5 for rating in rated)
     return tried_all and (redundant or any(rating.error < HEALTHY for rating in rated))
 
 
-def _rate(closed: Loop, role: Role, q: Array, goal: Array) -> _Rating:
+def _rate(loop: Loop, role: Role, q: Array, goal: Array) -> _Rating:
     """Try a role on poses (N, 4, 4) of known joints (N, 6)."""
-    pencil = build_pencil(role, closed.links, closed.prismatic, PSI[0])
+    pencil = build_pencil(role, loop.links, loop.prismatic, PSI[0])
     seeds = roots.root_seeds(pencil, inverse(goal), TILT[0], part=pencil.role.wide)
-    apart = np.abs(seeds.q - q[seeds.pose])
-    turned = np.abs(np.mod(apart + np.pi, 2 * np.pi) - np.pi)
-    distance = np.where(closed.prismatic, apart, turned).max(axis=1, initial=0.0)
+    change = np.abs(seeds.q - q[seeds.pose])
+    turn = np.abs(np.mod(change + np.pi, 2 * np.pi) - np.pi)
+    distance = np.where(loop.prismatic, change, turn).max(axis=1, initial=0.0)
     nearest = np.ones(q.shape[0])
     np.minimum.at(nearest, seeds.pose, distance)
     if np.median(nearest[:3]) > 1e-2:  # a role that the arm makes singular loses every pose
         return _Rating(20.0 + pencil.size, 0.0, 1.0, pencil)
     error = float(np.quantile(np.log10(nearest + tol.ERROR_FLOOR), 0.9))
-    left_open = float(np.mean(run_pass(closed, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
+    left_open = float(np.mean(run_pass(loop, pencil, goal, 0)[1])) if error < HEALTHY else 1.0
     # Below 1e-11 accuracy buys nothing; size and open poses cost time; a constant N (slot Lb) saves some.
     cost = max(error, -11.0) + 0.15 * pencil.size + 4 * left_open - 0.5 * (role.slot == 1)
     return _Rating(cost, error, left_open, pencil)

@@ -57,20 +57,20 @@ def close_loop(link: Array, prismatic: Bool) -> Loop:
     start = np.cumsum([0, *(f.shape[1] for f in free)])
     moves, lengths = np.zeros((15, start[-1])), np.zeros(15)
     for i in range(5):  # link[i + 1] becomes  t - d_i + R d_{i+1}
-        rows, before, behind = slice(3 * i, 3 * i + 3), slice(*start[i : i + 2]), slice(*start[i + 1 : i + 3])
+        rows, columns, next_columns = slice(3 * i, 3 * i + 3), slice(*start[i : i + 2]), slice(*start[i + 1 : i + 3])
         lengths[rows] = link[i + 1, :3, 3]
-        moves[rows, before] = -free[i]
-        moves[rows, behind] = link[i + 1, :3, :3] @ free[i + 1]
+        moves[rows, columns] = -free[i]
+        moves[rows, next_columns] = link[i + 1, :3, :3] @ free[i + 1]
     d = np.linalg.lstsq(moves, -lengths, rcond=tol.RANK)[0]
-    moved = np.array(link, dtype=float)
+    links = np.array(link, dtype=float)
     for i in range(6):
         move = free[i] @ d[start[i] : start[i + 1]]
-        moved[i, :3, 3] += moved[i, :3, :3] @ move
-        moved[i + 1, :3, 3] -= move
-    size = float(np.linalg.norm(moved[1:6, :3, 3], axis=1).sum()) / 3
+        links[i, :3, 3] += links[i, :3, :3] @ move
+        links[i + 1, :3, 3] -= move
+    size = float(np.linalg.norm(links[1:6, :3, 3], axis=1).sum()) / 3
     length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else UNIT_LENGTH
-    moved = shrink_translations(moved, length)
-    return Loop(np.array(prismatic, dtype=np.bool_), moved[0], moved[1:6], moved[6], length)
+    links = shrink_translations(links, length)
+    return Loop(np.array(prismatic, dtype=np.bool_), links[0], links[1:6], links[6], length)
 
 
 @dataclass(frozen=True)
@@ -107,18 +107,18 @@ def roles(prismatic: Bool, slot: int, hidden: tuple[int, ...], wide: bool = Fals
 
     Of wide ones one for each hidden joint: the two others play the same part.
     """
-    ways = []
+    walks = []
     for backward in (False, True):
         order = tuple((slot - i) % 6 if backward else (_X - slot + i) % 6 for i in range(6))
         if not prismatic[order[5]]:
             dialytic = {h: [j for j in range(3) if j != h][: 1 if wide else 2] for h in hidden}
-            ways += [Role(order, backward, slot, h, j, wide) for h in hidden for j in dialytic[h]]
-    return ways
+            walks += [Role(order, backward, slot, h, j, wide) for h in hidden for j in dialytic[h]]
+    return walks
 
 
 def links_by_part(role: Role, links: Array) -> Array:
     """La .. Le as (6, 4, 4) from the arm's five links (5, 4, 4); where the pose goes stands the identity."""
-    around = np.concatenate([links, np.eye(4)[None]])
+    cycle = np.concatenate([links, np.eye(4)[None]])
     if not role.backward:
-        return around[list(role.order)]
-    return inverse(around[[(i - 1) % 6 for i in role.order]])
+        return cycle[list(role.order)]
+    return inverse(cycle[[(i - 1) % 6 for i in role.order]])

@@ -55,18 +55,18 @@ def prepare(role: Role, part: Bool, links: Array) -> Ends:
     U_b = line_features.joint_rep(bool(part[1]), inverse=True)
     U_a = line_features.joint_rep(bool(part[0]), inverse=True)
     axis = line_features.rep(inverse(links[5])) @ line_features.Z_AXIS
-    turned = np.einsum("aij,j->ia", U_a, axis)
+    axis_features = np.einsum("aij,j->ia", U_a, axis)
     middle = line_features.rep(inverse(links[0]))
     nothing = np.empty((0, 15))
     if role.at_an_end:
-        factors: tuple[Array, ...] = (U_b.reshape(45, 15), turned)
+        factors: tuple[Array, ...] = (U_b.reshape(45, 15), axis_features)
         if role.slot == 5:
             product = np.einsum("bij,jk,akl->bail", U_b, middle, U_a)
             factors = (np.concatenate([product[b, a] for b, a in _MONOMIALS]),)
         size = np.linalg.svd(_monomials(role.slot, factors, _SAMPLES), compute_uv=False)
         rank = int(np.sum(size > tol.RANK * size[:, :1], axis=1).max())
         return Ends(role.slot, rank, factors, nothing, nothing)
-    product = np.einsum("bij,ja->iba", U_b, middle @ turned)
+    product = np.einsum("bij,ja->iba", U_b, middle @ axis_features)
     Q = np.stack([product[:, b, a] for b, a in _MONOMIALS], axis=1)
     basis, size, _ = np.linalg.svd(Q)
     rank = int(np.sum(size > tol.RANK * size[0]))
@@ -91,10 +91,10 @@ def eliminate_ends(ends: Ends, Y: Array) -> tuple[Array, Array]:
 
 def _monomials(slot: int, factors: tuple[Array, ...], Y: Array) -> Array:
     """Q (n, 15, 9) if the pose is in it."""
-    back = inverse(Y)
+    motion = inverse(Y)
     if slot == 5:
-        feature = line_features.features(back[:, :3, 3], back[:, :3, 2])
+        feature = line_features.features(motion[:, :3, 3], motion[:, :3, 2])
         return np.swapaxes((feature @ factors[0].T).reshape(-1, 9, 15), 1, 2)
-    U_b, turned = factors
-    product = (U_b @ (line_features.rep(back) @ turned)).reshape(-1, 3, 15, 3)
+    U_b, axis_features = factors
+    product = (U_b @ (line_features.rep(motion) @ axis_features)).reshape(-1, 3, 15, 3)
     return np.stack([product[:, b, :, a] for b, a in _MONOMIALS], axis=2)

@@ -23,12 +23,12 @@ def groups(pose: Int, x: Array) -> list[Int]:
     """Rows of candidates whose roots x are equal, and close to no other, (G, d) for each number d > 1 of them."""
     angle = 2 * np.arctan(x)
     order = np.lexsort((angle, pose))
-    away = np.where(np.diff(pose[order]) == 0, np.diff(angle[order]), np.inf)
-    away = np.concatenate([[np.inf], away, [np.inf]])[: len(pose) + 1]
-    first = np.flatnonzero(away[:-1] >= tol.EQUAL_ROOTS)
+    gaps = np.where(np.diff(pose[order]) == 0, np.diff(angle[order]), np.inf)
+    gaps = np.concatenate([[np.inf], gaps, [np.inf]])[: len(pose) + 1]
+    first = np.flatnonzero(gaps[:-1] >= tol.EQUAL_ROOTS)
     size = np.diff(np.append(first, len(pose)))
-    alone = (away[first] > tol.TWIN_ROOTS) & (away[first + size] > tol.TWIN_ROOTS)
-    return [order[first[alone & (size == d)][:, None] + np.arange(d)] for d in np.unique(size[size > 1]).tolist()]
+    isolated = (gaps[first] > tol.TWIN_ROOTS) & (gaps[first + size] > tol.TWIN_ROOTS)
+    return [order[first[isolated & (size == d)][:, None] + np.arange(d)] for d in np.unique(size[size > 1]).tolist()]
 
 
 def products(v: Array) -> tuple[Array, Bool, Bool]:
@@ -38,28 +38,28 @@ def products(v: Array) -> tuple[Array, Bool, Bool]:
     product in the span is one of them.
     """
     cubic = np.einsum("ij,gdjk->gdik", _CUBIC, v)
-    along, fit = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
+    first, first_fit = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
     if v.shape[3] == 4:
         cubic = np.einsum("ij,gdkj->gdik", _CUBIC, v)
-        second, also = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
+        second, second_fit = _quotient(cubic[:, :, :3], cubic[:, :, 1:])
     else:  # (1 + cos, sin) and (sin, 1 - cos): tan k/2 leads from one to the other
-        one, cosine, sine = np.moveaxis(v, 3, 0)
-        second, also = _quotient(np.stack([one + cosine, sine], axis=2), np.stack([sine, one - cosine], axis=2))
-    good = fit & also
-    tangent, vectors = np.linalg.eig(np.where(good[:, None, None], along + _SECOND * second, np.eye(v.shape[1])))
+        unit, cosine, sine = np.moveaxis(v, 3, 0)
+        second, second_fit = _quotient(np.stack([unit + cosine, sine], axis=2), np.stack([sine, unit - cosine], axis=2))
+    complete = first_fit & second_fit
+    tangent, vectors = np.linalg.eig(np.where(complete[:, None, None], first + _SECOND * second, np.eye(v.shape[1])))
     slant = np.abs(tangent.imag) / (1 + np.abs(tangent) ** 2)
-    apart = np.abs(tangent[:, :, None] - tangent[:, None, :]) + np.eye(v.shape[1])
-    good &= (apart > tol.UPRIGHT).all(axis=(1, 2)) & ~((slant > 0) & (slant < tol.UPRIGHT)).any(axis=1)
-    return np.ascontiguousarray(vectors.real.swapaxes(1, 2)), np.asarray(slant == 0), np.asarray(good)
+    separation = np.abs(tangent[:, :, None] - tangent[:, None, :]) + np.eye(v.shape[1])
+    complete &= (separation > tol.UPRIGHT).all(axis=(1, 2)) & ~((slant > 0) & (slant < tol.UPRIGHT)).any(axis=1)
+    return np.ascontiguousarray(vectors.real.swapaxes(1, 2)), np.asarray(slant == 0), np.asarray(complete)
 
 
 def _quotient(low: Array, high: Array) -> tuple[Array, Bool]:
     """X' (G, d, d) of high = X low for mixtures' rows (G, d, ...) turned by `_SHIFT_ANGLE`; whether X is determined."""
     shape = (*low.shape[:2], low.shape[2] * low.shape[3])
     c, s = np.cos(_SHIFT_ANGLE), np.sin(_SHIFT_ANGLE)
-    below, above = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)
-    square = below @ below.swapaxes(1, 2)
+    base, shifted = (c * low - s * high).reshape(shape), (s * low + c * high).reshape(shape)
+    square = base @ base.swapaxes(1, 2)
     size = np.linalg.eigvalsh(square)
-    good = size[:, 0] > tol.APART_VECTORS**2 * size[:, -1]
-    square = np.where(good[:, None, None], square, np.eye(low.shape[1]))
-    return np.linalg.solve(square, below @ above.swapaxes(1, 2)), good
+    full_rank = size[:, 0] > tol.APART_VECTORS**2 * size[:, -1]
+    square = np.where(full_rank[:, None, None], square, np.eye(low.shape[1]))
+    return np.linalg.solve(square, base @ shifted.swapaxes(1, 2)), full_rank

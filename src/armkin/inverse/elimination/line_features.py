@@ -40,15 +40,15 @@ def features(p: Array, direction: Array) -> Array:
     array([14.,  3.])
     """
     numbers = np.empty((*p.shape[:-1], SIZE))
-    square = np.sum(p * p, axis=-1)
-    along = np.sum(p * direction, axis=-1)
+    p_p = np.sum(p * p, axis=-1)
+    p_l = np.sum(p * direction, axis=-1)
     numbers[..., _P] = p
     numbers[..., _L] = direction
-    numbers[..., _PP] = square
-    numbers[..., _PL] = along
+    numbers[..., _PP] = p_p
+    numbers[..., _PL] = p_l
     for i, j, k in ((8, 1, 2), (9, 2, 0), (10, 0, 1)):  # p x l: np.cross takes ten times as long for one line
         numbers[..., i] = p[..., j] * direction[..., k] - p[..., k] * direction[..., j]
-    numbers[..., _W] = square[..., None] * direction - 2 * along[..., None] * p
+    numbers[..., _W] = p_p[..., None] * direction - 2 * p_l[..., None] * p
     numbers[..., _CONSTANT] = 1.0
     return numbers
 
@@ -89,16 +89,16 @@ def joint_rep(prismatic: bool, inverse: bool = False) -> Array:
     Found by sampling: a revolute joint at 0, 120 and 240 degrees, a prismatic one at -1, 0 and 1.
     """
     if prismatic:
-        back, still, ahead = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
-        U: Array = np.stack([still, (ahead - back) / 2, (ahead + back) / 2 - still])
-        odd = 1  # the coefficient that changes its sign with q
+        minus, zero, plus = (rep(joint_motion(True, q)) for q in (-1.0, 0.0, 1.0))
+        U: Array = np.stack([zero, (plus - minus) / 2, (plus + minus) / 2 - zero])
+        odd_term = 1  # the coefficient that changes its sign with q
     else:
         angles = 2 * np.pi / 3 * np.arange(3)
         samples = np.stack([rep(joint_motion(False, angle)) for angle in angles])
         weights = np.stack([np.full(3, 1 / 3), 2 / 3 * np.cos(angles), 2 / 3 * np.sin(angles)])
         U = np.einsum("uk,kij->uij", weights, samples)
-        odd = 2
+        odd_term = 2
     if inverse:
-        U[odd] *= -1
+        U[odd_term] *= -1
     U.flags.writeable = False
     return U

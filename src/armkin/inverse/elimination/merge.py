@@ -67,7 +67,7 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
     order = np.lexsort((key, answers.pose))
     key, answers = key[order], rows_of(answers, order)
     pose, q, residual = answers.pose, answers.q, answers.residual
-    keep, merged = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
+    keep, merged_poses = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
     widest = float(np.abs(_WEIGHTS).sum()) * tol.EXAMINED
     for gap in range(1, pose.size):
         first = np.flatnonzero((pose[gap:] == pose[:-gap]) & (key[gap:] - key[:-gap] < widest))
@@ -82,16 +82,16 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         first, second = first[examined], second[examined]
         step, distance = step[examined], distance[examined]
         target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
-        _, halfway = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
+        _, middle_error = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(tol.HALFWAY, 4 * np.maximum(residual[first], residual[second]))
         # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
-        same = (distance < np.maximum(tol.SAME_ANSWER, reach)) | (halfway < blur)
-        worse = residual[second] > residual[first]
-        keep[np.where(worse, second, first)[same]] = False
-        merged[pose[first[same & (distance > 1e-2 * tol.SAME_ANSWER)]]] = True
-    return rows_of(answers, keep), merged
+        equal = (distance < np.maximum(tol.SAME_ANSWER, reach)) | (middle_error < blur)
+        second_worse = residual[second] > residual[first]
+        keep[np.where(second_worse, second, first)[equal]] = False
+        merged_poses[pose[first[equal & (distance > 1e-2 * tol.SAME_ANSWER)]]] = True
+    return rows_of(answers, keep), merged_poses
 
 
 def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
@@ -110,14 +110,14 @@ def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
     return _table(answers, count, MAX_ANSWERS), near_singular
 
 
-def best_answers(answers: Answers, count: int, most: int) -> Array:
+def best_answers(answers: Answers, count: int, limit: int) -> Array:
     """At most so many answers of every pose (N = count), those of the smallest residual: (N, B, 6), NaN past them."""
-    return _table(rows_of(answers, np.lexsort((answers.residual, answers.pose))), count, most)
+    return _table(rows_of(answers, np.lexsort((answers.residual, answers.pose))), count, limit)
 
 
-def _table(answers: Answers, count: int, most: int) -> Array:
+def _table(answers: Answers, count: int, limit: int) -> Array:
     """At most so many answers of each pose, poses ascending, in their order: (N, B, 6), NaN past the last one."""
     column = numbers_within(np.bincount(answers.pose, minlength=count))
-    q, within = np.full((count, min(int(column.max(initial=-1)) + 1, most), 6), np.nan), column < most
-    q[answers.pose[within], column[within]] = answers.q[within]
+    q, fits = np.full((count, min(int(column.max(initial=-1)) + 1, limit), 6), np.nan), column < limit
+    q[answers.pose[fits], column[fits]] = answers.q[fits]
     return q

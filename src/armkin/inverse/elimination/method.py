@@ -46,7 +46,7 @@ from armkin.inverse.elimination import three_prismatic
 from armkin.inverse.elimination.choose_variable import Elimination, Kind, pose_kinds, prepare, sample_poses
 from armkin.inverse.elimination.closed_loop import Loop
 from armkin.inverse.elimination.merge import Answers, best_answers, merge_equal, pack_by_pose
-from armkin.inverse.elimination.passes import answers_of, none, run_pass
+from armkin.inverse.elimination.passes import answers_of, no_answers, run_pass
 from armkin.inverse.elimination.polish import refine
 from armkin.inverse.numeric import tolerances as tol
 
@@ -63,15 +63,15 @@ def left_open(elimination: Elimination, samples: int = 48) -> float:
 
     What only the main pass leaves open costs one more: near the class of a Kinova Gen3 with joint 3 held 16 %.
     """
-    closed = elimination.loop
+    loop = elimination.loop
     if not elimination.plans:
         return 0.0
     rng = np.random.default_rng(6)
-    q = np.where(closed.prismatic, rng.uniform(-1, 1, (samples, 6)), rng.uniform(-np.pi, np.pi, (samples, 6)))
-    goal, _ = sample_poses(closed, q)
+    q = np.where(loop.prismatic, rng.uniform(-1, 1, (samples, 6)), rng.uniform(-np.pi, np.pi, (samples, 6)))
+    goal, _ = sample_poses(loop, q)
     for number in range(2):
         if len(goal):
-            goal = goal[run_pass(closed, elimination.plans[number], goal, number)[1]]
+            goal = goal[run_pass(loop, elimination.plans[number], goal, number)[1]]
     return len(goal) / samples
 
 
@@ -85,13 +85,13 @@ class Branches(NamedTuple):
     guesses: Array
 
 
-def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
+def solve(elimination: Elimination, T: Array, shake: bool = True) -> Branches:
     """All isolated branches of many targets.
 
     Args:
         elimination: from `prepare`.
         T: (N, 4, 4) targets [mm].
-        moved: whether passes that move a pose follow where those that leave it where it is settle nothing.
+        shake: whether passes that move a pose follow where those that leave it where it is settle nothing.
 
     Returns:
         q: (N, B, 6) [rad in (-pi, pi] | mm], sorted by a fixed projection, NaN past a target's last branch;
@@ -103,71 +103,71 @@ def solve(elimination: Elimination, T: Array, moved: bool = True) -> Branches:
         guesses: (N, G, 6) postures close to answers of these, NaN past the last: to be corrected.
     """
     blocks = range(0, max(len(T), 1), BLOCK_POSES)
-    return stack_rows([_solve_block(elimination, T[begin : begin + BLOCK_POSES], moved) for begin in blocks])
+    return stack_rows([_solve_block(elimination, T[begin : begin + BLOCK_POSES], shake) for begin in blocks])
 
 
-def _solve_block(elimination: Elimination, T: Array, moved: bool) -> Branches:
+def _solve_block(elimination: Elimination, T: Array, shake: bool) -> Branches:
     """`solve` for as many targets as one should keep intermediate results of."""
-    closed, count = elimination.loop, T.shape[0]
+    loop, count = elimination.loop, T.shape[0]
     finite: Bool = np.all(np.isfinite(T), axis=(1, 2))
-    goal = closed.goal(np.where(finite[:, None, None], T, np.eye(4)))
+    goal = loop.goal(np.where(finite[:, None, None], T, np.eye(4)))
     if not elimination.plans:
-        answers, touching, settled = _solve_slides(closed, goal)
+        answers, touching, settled = _solve_slides(loop, goal)
         shaken = ~settled
-        beside = none()
+        near_answers = no_answers()
     else:
-        answers, beside, touching, settled, shaken = _run_passes(elimination, goal, moved)
+        answers, near_answers, touching, settled, shaken = _run_passes(elimination, goal, shake)
     answers = rows_of(answers, finite[answers.pose])
-    answers, merged = merge_equal(closed.chain, closed.prismatic, goal, answers)
+    answers, merged_poses = merge_equal(loop.chain, loop.prismatic, goal, answers)
     q, weak = pack_by_pose(answers, count)
-    unit = np.where(closed.prismatic, closed.length, 1.0)
-    guesses = best_answers(rows_of(beside, (finite & shaken)[beside.pose]), count, GUESSES)
-    return Branches(q * unit, (weak | merged | touching) & finite, settled, shaken & finite, guesses * unit)
+    unit = np.where(loop.prismatic, loop.length, 1.0)
+    guesses = best_answers(rows_of(near_answers, (finite & shaken)[near_answers.pose]), count, GUESSES)
+    return Branches(q * unit, (weak | merged_poses | touching) & finite, settled, shaken & finite, guesses * unit)
 
 
-def _run_passes(elimination: Elimination, goal: Array, moved: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
+def _run_passes(elimination: Elimination, goal: Array, shake: bool) -> tuple[Answers, Answers, Bool, Bool, Bool]:
     """Answers of all passes, each over the poses that the last one left open, and what is close to answers; then (N,)
     poses with touching pairs, settled ones, and those that went to a pass which moves them."""
-    parts, guesses = [none()], [none()]
+    parts, guesses = [no_answers()], [no_answers()]
     touching, shaken = np.zeros((2, goal.shape[0]), dtype=np.bool_)
     settled = np.ones(goal.shape[0], dtype=np.bool_)
     kind = pose_kinds(elimination.loop, goal)
     for chosen_kind in Kind:
         open_poses = np.flatnonzero(kind == chosen_kind)
-        for number, pencil in enumerate(elimination.of_kind(chosen_kind) if open_poses.size else ()):
+        for number, pencil in enumerate(elimination.pencils_of_kind(chosen_kind) if open_poses.size else ()):
             shaken[open_poses] |= tol.SHAKES[number] > 0
-            if tol.SHAKES[number] > 0 and not moved:
+            if tol.SHAKES[number] > 0 and not shake:
                 break
-            still = np.zeros(open_poses.size, dtype=np.bool_)
+            is_open = np.zeros(open_poses.size, dtype=np.bool_)
             for begin in range(0, open_poses.size, CHUNK):
                 part = open_poses[begin : begin + CHUNK]
-                answers, unsettled, touch, guess = run_pass(elimination.loop, pencil, goal[part], number)
+                answers, open_part, touch, guess = run_pass(elimination.loop, pencil, goal[part], number)
                 parts.append(answers._replace(pose=part[answers.pose]))
                 if number > 0:
                     guesses.append(guess._replace(pose=part[guess.pose]))
-                still[begin : begin + CHUNK] = unsettled
+                is_open[begin : begin + CHUNK] = open_part
                 touching[part] |= touch
-            open_poses = open_poses[still]
+            open_poses = open_poses[is_open]
             if open_poses.size == 0:
                 break
         settled[open_poses] = False
     return stack_rows(parts), stack_rows(guesses), touching, settled, shaken
 
 
-def _solve_slides(closed: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
+def _solve_slides(loop: Loop, goal: Array) -> tuple[Answers, Bool, Bool]:
     """Both answers of a chain with three prismatic joints; and whether roots touch, and whether they are all, (N,)."""
-    parts, touching, full = [none()], np.zeros(goal.shape[0], dtype=np.bool_), np.ones(goal.shape[0], dtype=np.bool_)
-    if np.sum(closed.prismatic) > 3:
+    parts, touching, full = [no_answers()], np.zeros(len(goal), np.bool_), np.ones(len(goal), np.bool_)
+    if np.sum(loop.prismatic) > 3:
         return parts[0], touching, full
     for begin in range(0, goal.shape[0], CHUNK):
         part = goal[begin : begin + CHUNK]
-        q, full[begin : begin + CHUNK] = three_prismatic.branches(closed.chain, closed.prismatic, part)
+        q, full[begin : begin + CHUNK] = three_prismatic.branches(loop.chain, loop.prismatic, part)
         q = q.reshape(-1, 6)
         pose = np.repeat(np.arange(part.shape[0]), 2)
-        polished = refine(closed.chain, closed.prismatic, q, part[pose], 4)
+        polished = refine(loop.chain, loop.prismatic, q, part[pose], 4)
         # where the links are all but points the loop's unit is so small that slides are millions of it long
-        far = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
-        good = polished.residual < tol.GRAZING * far
-        touching[begin + pose[good & (polished.residual > tol.ELIMINATED * far)]] = True
-        parts.append(answers_of(closed, begin + pose, polished, good))
+        scale = np.maximum(1.0, np.linalg.norm(part[pose, :3, 3], axis=1))
+        valid = polished.residual < tol.GRAZING * scale
+        touching[begin + pose[valid & (polished.residual > tol.ELIMINATED * scale)]] = True
+        parts.append(answers_of(loop, begin + pose, polished, valid))
     return stack_rows(parts), touching, full

@@ -138,13 +138,13 @@ def _sides(role: Role, part: Bool, links: Array, N: Array) -> tuple[Array, Array
 
 
 @cache
-def _dialytic(hidden: int, dialytic: int, sliding: bool, wide: bool, third_sliding: bool) -> Array:
+def _dialytic(hidden: int, dialytic: int, slides: bool, wide: bool, third_slides: bool) -> Array:
     """Monomials of (2) to M_0, M_1, M_2 (the coefficients of 1, b1, b2 of h): (3, 27, 2, 12), wide (3, 27, 4, 16).
 
-    sliding, third_sliding: the dialytic joint, the third one is prismatic.
+    slides, third_slides: the dialytic joint, the third one is prismatic.
     """
-    multipliers = _POWERS if sliding else _HALF_ANGLE
-    third_multipliers = _POWERS if third_sliding else _HALF_ANGLE
+    multipliers = _POWERS if slides else _HALF_ANGLE
+    third_multipliers = _POWERS if third_slides else _HALF_ANGLE
     third = third_multipliers if wide else np.eye(3)[None]
     unit = np.eye(27).reshape(27, 3, 3, 3)
     unit = np.moveaxis(unit, (1 + hidden, 1 + dialytic, 4 - hidden - dialytic), (1, 2, 3))
@@ -156,8 +156,8 @@ def _dialytic(hidden: int, dialytic: int, sliding: bool, wide: bool, third_slidi
 
 def _coefficients(role: Role, part: Bool) -> Array:
     """`_dialytic` of a role and the joint types by part (6,)."""
-    sliding, third_sliding = bool(part[2 + role.dialytic]), bool(part[2 + role.third])
-    return _dialytic(role.hidden, role.dialytic, sliding, role.wide, third_sliding)
+    slides, third_slides = bool(part[2 + role.dialytic]), bool(part[2 + role.third])
+    return _dialytic(role.hidden, role.dialytic, slides, role.wide, third_slides)
 
 
 def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128]:
@@ -169,8 +169,8 @@ def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128
     null = vectors[size < tol.NULL * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.
     # The singular values of K^T K are the cosines between K and its conjugate.
-    _, cosine, turned = np.linalg.svd(null.T @ null)
-    return np.asarray(null @ turned.conj().T[:, cosine < 0.99])
+    _, cosine, mixing = np.linalg.svd(null.T @ null)
+    return np.asarray(null @ mixing.conj().T[:, cosine < 0.99])
 
 
 def _columns(role: Role, part: Bool, psi: float, K: NDArray[np.complex128] | Array, W: Array) -> Array:

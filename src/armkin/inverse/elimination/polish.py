@@ -44,15 +44,15 @@ def _with_both_signs(sine: Array) -> Array:
 
 def _moved_frame(frame: Array, q: Array, cosine: Array, sine: Array, prismatic: bool) -> Array:
     """`turn` by angles of which the cosines (M,) and the sines with both signs (2, M) are known."""
-    moved = np.empty_like(frame)
+    new_frame = np.empty_like(frame)
     if prismatic:
-        moved[:, :3] = frame[:, :3]
-        moved[:, 3] = frame[:, 3] + q * frame[:, 2]
-        return moved
-    np.multiply(frame[:, :2], cosine, out=moved[:, :2])
-    moved[:, :2] += frame[:, 1::-1] * sine  # c x + s y, c y - s x
-    moved[:, 2:] = frame[:, 2:]
-    return moved
+        new_frame[:, :3] = frame[:, :3]
+        new_frame[:, 3] = frame[:, 3] + q * frame[:, 2]
+        return new_frame
+    np.multiply(frame[:, :2], cosine, out=new_frame[:, :2])
+    new_frame[:, :2] += frame[:, 1::-1] * sine  # c x + s y, c y - s x
+    new_frame[:, 2:] = frame[:, 2:]
+    return new_frame
 
 
 def advance(frame: Array, link: Array) -> Array:
@@ -109,42 +109,42 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
     count = q.shape[0]
     value = np.ascontiguousarray(q.T)
     target = np.ascontiguousarray(goal[:, :3].transpose(1, 2, 0))
-    best, residual = value.copy(), np.full(count, np.inf)
+    best_q, residual = value.copy(), np.full(count, np.inf)
     weakness, inverse = np.full(count, np.inf), np.empty((count, 6, 6))
     active, last = np.arange(count), np.zeros(count)
-    most = steps if damped else steps + SLOW_STEPS
-    for step in range(most + 1):
+    max_steps = steps if damped else steps + SLOW_STEPS
+    for step in range(max_steps + 1):
         frame, joints = tip(link, prismatic, value)
         error, size = pose_error(frame, target)
         if step == 0:
             guess = size
-        better = size < residual[active]
-        index = active[better]
-        best[:, index], residual[index] = value[:, better], size[better]
+        is_better = size < residual[active]
+        index = active[is_better]
+        best_q[:, index], residual[index] = value[:, is_better], size[is_better]
         # While the residual falls steeply the last inverse Jacobian is good for one more step.
         stale = np.flatnonzero((size > tol.STALE * last) & (size > tol.CONVERGED)) if step else active
         last = size
         if stale.size:
-            chosen = slice(None) if stale.size == active.size else stale
-            square = jacobian(frame[..., chosen], joints[..., chosen], prismatic)
-            fresh = nudged(np.linalg.inv, square)
-            index = active[chosen]
-            weakness[index] = np.sqrt(np.einsum("mij,mij->m", fresh, fresh))
+            rows = slice(None) if stale.size == active.size else stale
+            square = jacobian(frame[..., rows], joints[..., rows], prismatic)
+            new_inverse = nudged(np.linalg.inv, square)
+            index = active[rows]
+            weakness[index] = np.sqrt(np.einsum("mij,mij->m", new_inverse, new_inverse))
             if damped and step < steps - 2:
                 transposed = np.swapaxes(square, 1, 2)
-                damping = size[chosen] * np.minimum(size[chosen], 1.0)
+                damping = size[rows] * np.minimum(size[rows], 1.0)
                 normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
-                fresh = np.matmul(nudged(np.linalg.inv, normal), transposed)
-            inverse[index] = fresh
-        open_ = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOW_DISTANCE)
-        going = np.flatnonzero(open_)
-        if step == most or going.size == 0:
+                new_inverse = np.matmul(nudged(np.linalg.inv, normal), transposed)
+            inverse[index] = new_inverse
+        is_open = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOW_DISTANCE)
+        pending = np.flatnonzero(is_open)
+        if step == max_steps or pending.size == 0:
             break
-        if going.size < active.size:
-            active, value, target = active[going], value[:, going], target[..., going]
-            error, last = error[:, going], last[going]
+        if pending.size < active.size:
+            active, value, target = active[pending], value[:, pending], target[..., pending]
+            error, last = error[:, pending], last[pending]
         move = np.matmul(inverse[active], error.T[:, :, None])[:, :, 0].T
         longest = np.abs(move).max(axis=0)
         move[:, ~np.isfinite(longest)] = 0.0  # the inverse of an all but singular Jacobian has overflown
         value = value + move * np.minimum(1.0, LARGEST_STEP / np.maximum(longest, LARGEST_STEP))
-    return Polished(best.T, residual, guess, weakness)
+    return Polished(best_q.T, residual, guess, weakness)

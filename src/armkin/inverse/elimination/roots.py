@@ -29,7 +29,7 @@ class RootSeeds(NamedTuple):
     """Approximate real solutions of many poses, one row a candidate, poses ascending.
 
     pose: (M,) index of the pose.  q: (M, 6) joint values in the arm's order.  hidden: (M,) value of q_h.
-    tilt: (M,) imaginary part of the root as an angle.  rough: (N,) poses whose pencil was badly scaled.
+    tilt: (M,) imaginary part of the root as an angle.  badly_scaled: (N,) poses whose pencil was badly scaled.
     defect: (M,) squared sine of the angle between the eigenvector and the product that a solution's is; 0 where slides
     move.  gap: (M,) distance from the pose's nearest other root but for a twin, see `_root_gaps`, as an angle; inf of a
     multiple root whose solutions are all known; 0 where the pencil is not well scaled.
@@ -39,7 +39,7 @@ class RootSeeds(NamedTuple):
     q: Array
     hidden: Array
     tilt: Array
-    rough: Bool
+    badly_scaled: Bool
     defect: Array
     gap: Array
 
@@ -50,17 +50,17 @@ class RootSeeds(NamedTuple):
 
 
 class _PencilRoots(NamedTuple):
-    """Roots (M,) of poses, the which-th of each, as real x and tilt, and their vectors (M, size).
+    """Roots (M,) of poses, the number-th of each, as real x and tilt, and their vectors (M, size).
 
-    parted: (M,) of a multiple root, whose vectors are those of all that share it.
+    multiple: (M,) of a multiple root, whose vectors are those of all that share it.
     """
 
     pose: Int
-    which: Int
+    number: Int
     x: Array
     tilt: Array
     u: Array
-    parted: Bool
+    multiple: Bool
 
 
 def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -> RootSeeds:
@@ -70,7 +70,7 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
     """
     Y = inverse(X) if pencil.role.backward else X
     equations, recover = _equations(pencil, Y)
-    companion, rough, steady = _companions(pencil, equations)
+    companion, badly_scaled, well_scaled = _companions(pencil, equations)
     roots, vectors = np.linalg.eig(companion)
     candidates = _nearly_real(roots, vectors, tolerance)
     if part and not pencil.prismatic[2:5].any():
@@ -79,15 +79,15 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
     finite = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
     if finite.size < len(defect):
         candidates, middle, defect = rows_of(candidates, finite), middle[:, finite], defect[finite]
-    pose, index, _, tilt, _, parted = candidates
+    pose, index, _, tilt, _, multiple = candidates
     a, b, e = _other_joints(pencil, middle, Y, pose, recover)
     q = np.empty((pose.size, 6))
     for joint, value in zip(pencil.role.order, (a, b, *middle, e), strict=True):
         q[:, joint] = -value if pencil.role.backward else value
-    gap = np.where(parted & steady[pose], np.inf, 0.0)
-    unsure = np.flatnonzero((defect > tol.NO_PRODUCT) & steady[pose] & ~parted)
-    gap[unsure] = _root_gaps(roots[pose[unsure]], vectors[pose[unsure]], index[unsure])
-    return RootSeeds(pose, q, middle[pencil.role.hidden], tilt, rough, defect, gap)
+    gap = np.where(multiple & well_scaled[pose], np.inf, 0.0)
+    doubtful = np.flatnonzero((defect > tol.NO_PRODUCT) & well_scaled[pose] & ~multiple)
+    gap[doubtful] = _root_gaps(roots[pose[doubtful]], vectors[pose[doubtful]], index[doubtful])
+    return RootSeeds(pose, q, middle[pencil.role.hidden], tilt, badly_scaled, defect, gap)
 
 
 def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
@@ -96,16 +96,16 @@ def _companions(pencil: Pencil, equations: Array) -> tuple[Array, Bool, Bool]:
     count = equations.shape[2] - lead
     right = np.empty((len(equations), lead, count + 1))
     right[:, :, :count], right[:, :, count] = equations[:, :, lead:], _ANYWHERE[:lead]
-    solved = nudged(np.linalg.solve, equations[:, :, :lead], right)
-    G, anywhere = solved[:, :, :count], solved[:, :, count]
+    solution = nudged(np.linalg.solve, equations[:, :, :lead], right)
+    G, side_answer = solution[:, :, :count], solution[:, :, count]
     size = np.abs(G).max(axis=(1, 2))
     # A singular pencil may hide itself: what it has in common on both sides cancels. No side of its own can.
-    rough = (size > ROUGH_ENTRY) | (np.abs(anywhere).max(axis=1) > SINGULAR_ENTRY)
+    badly_scaled = (size > ROUGH_ENTRY) | (np.abs(side_answer).max(axis=1) > SINGULAR_ENTRY)
     r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     companion = np.zeros((len(G), 2 * r + 2 * w, 2 * r + 2 * w))
     companion[:, :lead] = -G
     companion[:, lead:, 2 * r : lead] = np.eye(w)
-    return companion, rough, size < STEADY_ENTRY
+    return companion, badly_scaled, size < STEADY_ENTRY
 
 
 def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], tolerance: float) -> _PencilRoots:
@@ -128,9 +128,9 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     part = sign * q[:, list(pencil.role.order)].T  # a, b, m1, m2, m3, e
     _, recover = eliminate_ends(pencil.ends, Y)
     a, b, e = _other_joints(pencil, part[2:5], Y, np.arange(len(q)), recover)
-    away = np.stack([a, b, e]) - part[[0, 1, 5]]
-    turning = ~pencil.prismatic[[0, 1, 5]][:, None]
-    return np.asarray((np.abs(np.where(turning, np.angle(np.exp(1j * away)), away)) < tol.FOLLOWS).all(axis=0))
+    change = np.stack([a, b, e]) - part[[0, 1, 5]]
+    revolute = ~pencil.prismatic[[0, 1, 5]][:, None]
+    return np.asarray((np.abs(np.where(revolute, np.angle(np.exp(1j * change)), change)) < tol.FOLLOWS).all(axis=0))
 
 
 def _part_equal_roots(pencil: Pencil, single: _PencilRoots, vectors: NDArray[np.complex128]) -> _PencilRoots:
@@ -138,23 +138,23 @@ def _part_equal_roots(pencil: Pencil, single: _PencilRoots, vectors: NDArray[np.
     count = len(single.pose)
     # rounding made a complex pair of some
     twin = np.flatnonzero((single.tilt > 0) & (single.tilt < tol.EQUAL_ROOTS))
-    pose, index, x, tilt, u, parted = (np.concatenate([part, part[twin]]) for part in single)
-    u[count:] = vectors.imag[single.pose[twin], :, single.which[twin]]
-    stays = np.arange(len(pose)) < count
+    pose, index, x, tilt, u, multiple = (np.concatenate([part, part[twin]]) for part in single)
+    u[count:] = vectors.imag[single.pose[twin], :, single.number[twin]]
+    keep = np.arange(len(pose)) < count
     for rows in filter(len, equal_roots.groups(pose, x)):
         d = rows.shape[1]
         span = u[rows] / np.linalg.norm(u[rows], axis=2, keepdims=True)
         _, size, basis = np.linalg.svd(span, full_matrices=False)
         middle = np.repeat(x[rows].mean(axis=1), d)
         of_products = _vector(pencil, middle, basis.reshape(-1, basis.shape[2])).reshape(-1, d, 4, pencil.products // 4)
-        weights, real, good = equal_roots.products(of_products)
-        good &= size[:, -1] > tol.APART_VECTORS * size[:, 0]
-        part = rows[good].ravel()
-        u[part] = (weights[good] @ basis[good]).reshape(len(part), u.shape[1])
-        tilt[part], parted[part], stays[part] = 0.0, True, real[good].ravel()
-    order = np.flatnonzero(stays)
+        weights, real, complete = equal_roots.products(of_products)
+        complete &= size[:, -1] > tol.APART_VECTORS * size[:, 0]
+        part = rows[complete].ravel()
+        u[part] = (weights[complete] @ basis[complete]).reshape(len(part), u.shape[1])
+        tilt[part], multiple[part], keep[part] = 0.0, True, real[complete].ravel()
+    order = np.flatnonzero(keep)
     order = order[np.argsort(pose[order], kind="stable")]
-    return _PencilRoots(pose[order], index[order], x[order], tilt[order], u[order], parted[order])
+    return _PencilRoots(pose[order], index[order], x[order], tilt[order], u[order], multiple[order])
 
 
 def _root_gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], index: Int) -> Array:
@@ -168,16 +168,16 @@ def _root_gaps(roots: NDArray[np.complex128], vectors: NDArray[np.complex128], i
     size = 1 + np.abs(roots) ** 2
     row = np.arange(index.size)
     x, v = roots[row, index][:, None], vectors[row, :, index]
-    away = 2 * np.abs(roots - x) / np.sqrt(size * (1 + np.abs(x) ** 2))
-    away[row, index] = np.inf
-    twin = away.argmin(axis=1)
-    apart = away[row, twin]
+    distances = 2 * np.abs(roots - x) / np.sqrt(size * (1 + np.abs(x) ** 2))
+    distances[row, index] = np.inf
+    twin = distances.argmin(axis=1)
+    gap = distances[row, twin]
     twin_vectors = vectors[row, :, twin]
     sine = np.linalg.norm(twin_vectors - v * (v.conj() * twin_vectors).sum(axis=1, keepdims=True), axis=1)
-    double = (apart < tol.TWIN_ROOTS) & (sine < DOUBLE_SLOPE * apart)
-    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, index].imag != 0) & (sine * apart > tol.REAL_PAIR)
-    away[row, twin] = np.where(double | pair, np.inf, apart)
-    return np.asarray(away.min(axis=1))
+    double = (gap < tol.TWIN_ROOTS) & (sine < DOUBLE_SLOPE * gap)
+    pair = (roots[row, twin] == x[:, 0].conj()) & (roots[row, index].imag != 0) & (sine * gap > tol.REAL_PAIR)
+    distances[row, twin] = np.where(double | pair, np.inf, gap)
+    return np.asarray(distances.min(axis=1))
 
 
 def _equations(pencil: Pencil, Y: Array) -> tuple[Array, Array]:
@@ -201,8 +201,8 @@ def _vector(pencil: Pencil, x: Array, u: Array) -> Array:
     a1, a2, y, low = np.split(u, (r, 2 * r, 2 * r + w), axis=1)
     x = x[:, None]
     large = np.abs(x) > 1
-    flat = np.where(large, y / np.where(large, x, 1.0), low)  # y = x w: take the safer one
-    v = flat @ pencil.W.T
+    w_vector = np.where(large, y / np.where(large, x, 1.0), low)  # y = x w: take the safer one
+    v = w_vector @ pencil.W.T
     if r:
         square = x * x + 1
         v += ((a1 * x + a2) / square) @ pencil.K_re.T - ((a1 - a2 * x) / square) @ pencil.K_im.T
@@ -236,8 +236,8 @@ def _middle_joints(pencil: Pencil, x: Array, u: Array) -> tuple[Array, Array]:
     third_powers = _half_powers(k) if pencil.role.wide else np.stack([np.ones_like(k), np.cos(k), np.sin(k)], axis=1)
     inner = (v * third_powers[:, None, :]).sum(axis=2)
     # a product's square is 2 x 2: of the powers of either joint, and of (1, cos, sin)
-    along = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2
-    return value, np.maximum(1.0 - along / (4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)), 0.0)
+    projection = (inner * _half_powers(value[pencil.role.dialytic])).sum(axis=1) ** 2
+    return value, np.maximum(1.0 - projection / (4.0 * np.maximum(size.sum(axis=(1, 2)), tol.TINY)), 0.0)
 
 
 def _half_powers(q: Array) -> Array:
@@ -262,13 +262,13 @@ def _other_joints(pencil: Pencil, middle: Array, Y: Array, pose: Int, recover: A
         A = advance(turn(A, middle[i], bool(pencil.prismatic[2 + i])), links[2 + i])
     feature = line_features.features(A[:, 3].T, A[:, 2].T)
     factors = recover[pose] if recover.shape[0] > 1 else recover
-    one, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
-    sign = np.where(one < 0, -1.0, 1.0)
-    safe = np.where(np.abs(one) < tol.TINY, 1.0, one)
-    a = a1 / safe if is_a else np.arctan2(sign * a2, sign * a1)
-    b = b1 / safe if is_b else np.arctan2(sign * b2, sign * b1)
-    before = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)
-    # before @ A = Je^-1, a turn by -e about z
-    sine = np.sum(before[0, :3] * A[:, 1] - before[1, :3] * A[:, 0], axis=0)
-    cosine = np.sum(before[0, :3] * A[:, 0] + before[1, :3] * A[:, 1], axis=0)
+    scale, b1, b2, a1, a2 = np.matmul(factors, feature[:, :, None])[:, :, 0].T
+    sign = np.where(scale < 0, -1.0, 1.0)
+    divisor = np.where(np.abs(scale) < tol.TINY, 1.0, scale)
+    a = a1 / divisor if is_a else np.arctan2(sign * a2, sign * a1)
+    b = b1 / divisor if is_b else np.arctan2(sign * b2, sign * b1)
+    frame = turn(advance(turn(advance(start, links[5]), a, is_a), links[0]), b, is_b)
+    # frame @ A = Je^-1, a turn by -e about z
+    sine = np.sum(frame[0, :3] * A[:, 1] - frame[1, :3] * A[:, 0], axis=0)
+    cosine = np.sum(frame[0, :3] * A[:, 0] + frame[1, :3] * A[:, 1], axis=0)
     return a, b, np.arctan2(sine, cosine)

@@ -42,36 +42,36 @@ def branches(chain: Array, prismatic: Bool, goal: Array) -> tuple[Array, Bool]:
     A[-1] = A[-1] @ chain[6, :3, :3]
     B = A[0].T @ goal[:, :3, :3] @ A[3].T
     u, v = A[1][2], A[2][:, 2]
-    even, odd = u[0] * v[0] + u[1] * v[1], u[1] * v[0] - u[0] * v[1]
-    across = np.hypot(B[:, 0, 2], B[:, 1, 2])
-    longer, shorter = across * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
-    square = (longer - shorter) * (longer + shorter)
-    free = across < tol.PARALLEL_SLIDES
+    k_cos, k_sin = u[0] * v[0] + u[1] * v[1], u[1] * v[0] - u[0] * v[1]
+    b_norm = np.hypot(B[:, 0, 2], B[:, 1, 2])
+    hypotenuse, leg = b_norm * np.hypot(v[0], v[1]), np.abs(u[2] - v[2] * B[:, 2, 2])
+    square = (hypotenuse - leg) * (hypotenuse + leg)
+    free = b_norm < tol.PARALLEL_SLIDES
     square[(square < tol.MERGED_SLIDES) & ~free] = 0.0
-    half = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
-    q2 = np.arctan2(odd, even) + np.stack([half, -half], axis=1)
+    half_angle = np.arctan2(np.sqrt(np.maximum(square, 0.0)), B[:, 2, 2] - u[2] * v[2])
+    q2 = np.arctan2(k_sin, k_cos) + np.stack([half_angle, -half_angle], axis=1)
     middle = A[1] @ rotation_about(2, q2) @ A[2]
     q1 = np.arctan2(B[:, None, 1, 2], B[:, None, 0, 2]) - np.arctan2(middle[..., 1, 2], middle[..., 0, 2])
     q1[free] = FREE_ANGLE
 
-    def whole(q1: Array, rows: Bool) -> tuple[Array, Array]:
+    def solve(q1: Array, rows: Bool) -> tuple[Array, Array]:
         """Solutions (K, 2, 6) of some goals for values of q1 (K, 2), and the weakest of the slides' directions (K,)."""
         last = np.swapaxes(rotation_about(2, q1) @ middle[rows], -1, -2) @ B[rows, None]
         q3 = np.arctan2(last[..., 1, 0] - last[..., 0, 1], last[..., 0, 0] + last[..., 1, 1])
         return _with_slides(chain, prismatic, np.stack([q1, q2[rows], q3], axis=-1), goal[rows])
 
-    q, weakest = whole(q1, np.ones(len(goal), bool))
-    sure = ~((square < tol.NEARLY_COPLANAR**2) & (weakest < tol.NEARLY_COPLANAR)) | free
-    sure[free] = weakest[free] > tol.NEARLY_COPLANAR
+    q, weakest = solve(q1, np.ones(len(goal), bool))
+    full = ~((square < tol.NEARLY_COPLANAR**2) & (weakest < tol.NEARLY_COPLANAR)) | free
+    full[free] = weakest[free] > tol.NEARLY_COPLANAR
     for value in OTHER_ANGLES if free.any() else ():
-        sure[free] &= np.abs(whole(np.full_like(q1[free], value), free)[1] - weakest[free]) < tol.NEARLY_COPLANAR
-    return q, sure
+        full[free] &= np.abs(solve(np.full_like(q1[free], value), free)[1] - weakest[free]) < tol.NEARLY_COPLANAR
+    return q, full
 
 
-def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> tuple[Array, Array]:
+def _with_slides(chain: Array, prismatic: Bool, revolute: Array, goal: Array) -> tuple[Array, Array]:
     """Joint values (N, 2, 6) from those that turn (N, 2, 3), and the slides' smallest singular value (N,)."""
-    q = np.zeros((*turned.shape[:2], 6))
-    q[..., ~prismatic] = turned
+    q = np.zeros((*revolute.shape[:2], 6))
+    q[..., ~prismatic] = revolute
     frame = np.broadcast_to(chain[0], (*q.shape[:2], 4, 4))
     axes = []
     for i in range(6):
@@ -80,10 +80,10 @@ def _with_slides(chain: Array, prismatic: Bool, turned: Array, goal: Array) -> t
             frame = frame @ chain[i + 1]
         else:
             frame = frame @ joint_motion(False, q[..., i]) @ chain[i + 1]
-    missing = goal[:, None, :3, 3] - frame[..., :3, 3]
+    offset = goal[:, None, :3, 3] - frame[..., :3, 3]
     # an explicit pseudoinverse would lose as many digits as the weakest direction has
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
-    ahead = np.swapaxes(U, -1, -2) @ missing[..., None]
-    moves = np.divide(ahead, S[..., None], out=np.zeros_like(ahead), where=S[..., None] > tol.COPLANAR)
+    components = np.swapaxes(U, -1, -2) @ offset[..., None]
+    moves = np.divide(components, S[..., None], out=np.zeros_like(components), where=S[..., None] > tol.COPLANAR)
     q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q, S[..., -1].min(axis=1)
