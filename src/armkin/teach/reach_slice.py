@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import Redundancy, moved, redundancy
+from armkin.inverse.solvers.redundancy import Redundancy, move_targets, redundancy
 from armkin.inverse.tasks.task import distance
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import actual_arm
@@ -79,7 +79,7 @@ def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
         unreached = np.flatnonzero(near_enough & ~reached)
         s = ik(
             free.rest,
-            moved(arm, free, target[unreached], np.full(len(unreached), value)),
+            move_targets(arm, free, target[unreached], np.full(len(unreached), value)),
             free.task.name,
             examine=False,
         )

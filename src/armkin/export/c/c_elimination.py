@@ -22,7 +22,7 @@ from armkin.inverse.elimination.roots import STEADY_ENTRY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
-from armkin.inverse.solvers.redundancy import moved_entries
+from armkin.inverse.solvers.redundancy import move_entries
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
@@ -212,7 +212,7 @@ def _with_held_joint(arm: Arm, held: Redundancy) -> str:
     inputs = [f"goal[{k} * ARM_LANES + i]" for k in range(size)]
     held_value = f"near[{held.joint} * ARM_LANES + i]"
     inputs += [f"ARM_COS({held_value})", f"ARM_SIN({held_value})"]
-    recorded = recording.record(lambda x: moved_entries(arm, held, x[:size], Pair(*x[size:])), len(inputs))
+    recorded = recording.record(lambda x: move_entries(arm, held, x[:size], Pair(*x[size:])), len(inputs))
     code = c_and_js_code.write_code(recorded, inputs)
     lines = [*code.lines, *(f"others[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
     text = part_text("held_joint").replace("@lines@", "\n        ".join(lines))

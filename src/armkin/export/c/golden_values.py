@@ -59,7 +59,9 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
 def _solve_branches(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
     """Branches (N, B, n), which are there and their indices (N, B), a redundant joint held at home."""
     spare = redundancy(actual_arm(arm), task.name)
-    held = {} if spare is None or spare.still else {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
+    held = {}
+    if spare is not None and not spare.about_tool_axis:
+        held = {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
     solutions = ik(lock(arm, held) if held else arm, target, task.name)
     return unlock(arm, held, solutions.q), solutions.valid, solutions.branch
 

@@ -30,7 +30,7 @@ from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower, Ik
 from armkin.inverse.redundant.traced_families import Traced, trace_families
-from armkin.inverse.solvers.redundancy import Redundancy, moved, nearly_closed
+from armkin.inverse.solvers.redundancy import Redundancy, move_targets, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model import units
@@ -54,7 +54,7 @@ def families(
 
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
-    if free.still:
+    if free.about_tool_axis:
         return _with_tool_turn(ik, arm, free, targets, near, rounding)
     task = free.task
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
@@ -80,7 +80,8 @@ def families(
     q, interval, legal, branch = rows.stack_parts()
     valid = branch >= 0
     status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
-    names = ik(free.rest, moved(arm, free, goal[:1], np.zeros(1)), task.name, examine=False).names if len(goal) else ()
+    first_goal = move_targets(arm, free, goal[:1], np.zeros(len(goal[:1])))
+    names = ik(free.rest, first_goal, task.name, examine=False).names if len(goal) else ()
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = method_of_families(arm, free)
     batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
@@ -119,7 +120,7 @@ def _with_tool_turn(
 def method_of_families(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
     joint = arm.joint_names[free.joint]
-    if free.still:
+    if free.about_tool_axis:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
         return f"families of {joint}", why + free.geometry.why, free.geometry.complete
     turned, complete = actual_arm(arm), False

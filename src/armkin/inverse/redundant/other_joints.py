@@ -24,7 +24,7 @@ from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundancy import Redundancy, moved, moved_entries
+from armkin.inverse.solvers.redundancy import Redundancy, move_entries, move_targets
 from armkin.model.arm import Arm
 
 Ik = Callable[..., Solutions]
@@ -68,7 +68,7 @@ def _recorded_form(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[
     inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
 
     def formula(x: list[Entry]) -> list[Entry]:
-        goal = moved_entries(arm, free, x[:inputs], Pair(x[inputs], x[inputs + 1]))
+        goal = move_entries(arm, free, x[:inputs], Pair(x[inputs], x[inputs + 1]))
         return rest_form.candidates(goal, [None] * rest_form.arm.n)
 
     return StraightLineCode(formula, inputs + 2), rest_form.axes
@@ -96,7 +96,7 @@ class Follower(NamedTuple):
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
         where there is none."""
         if not self.free.by_formula:
-            goal = moved(self.arm, self.free, self.target[rows], t)
+            goal = move_targets(self.arm, self.free, self.target[rows], t)
             s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
             return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
         q, missed = self.candidates(rows, t)

@@ -38,56 +38,56 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     if arm.n == 6:
         prepared = method.prepare(arm.link, arm.prismatic)
-        why = "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches"
-        every, unmoved = (partial(_solve_six, prepared, moved=moved) for moved in (True, False))
-        return Geometry(NAME, why, prepared.complete, None, every, unmoved, ordered=False, elimination=prepared)
+        reason = "no axes meet or run parallel as a closed form would need: numeric elimination, up to 16 branches"
+        solve, unmoved = (partial(_solve_six, prepared, shake=shake) for shake in (True, False))
+        return Geometry(NAME, reason, prepared.complete, None, solve, unmoved, ordered=False, elimination=prepared)
     if arm.n == 5 and (wrist := _with_wrist(arm, task)) is not None:
         return wrist
     link, prismatic = _with_virtual_joints(arm)
     prepared = method.prepare(link, prismatic)
 
     def rows(T: Array) -> Rows:
-        q, doubt, settled, shaken, guesses = method.solve(prepared, T)
+        q, doubt, is_settled, shaken, guesses = method.solve(prepared, T)
         n = arm.n
         hit = np.abs(q[:, :, n:]).max(axis=2) < tol.AT_ZERO
         k, b = np.nonzero(hit)
         branches = np.full((*q.shape[:2], n), np.nan)
         if len(k):
-            better, size = newton.correct(arm, task, q[k, b, :n], T[k])
-            branches[k, b] = np.where((size < tol.ANSWERED)[:, None], better, np.nan)
-        missing = np.isnan(branches[:, :, 0])
-        count = (~missing).sum(axis=1)
-        order = np.argsort(missing, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
+            root, size = newton.correct(arm, task, q[k, b, :n], T[k])
+            branches[k, b] = np.where((size < tol.ANSWERED)[:, None], root, np.nan)
+        absent = np.isnan(branches[:, :, 0])
+        count = (~absent).sum(axis=1)
+        order = np.argsort(absent, axis=1, kind="stable")[:, : max(int(count.max(initial=0)), 1)]
         branches = np.take_along_axis(branches, order[:, :, None], axis=1)
         doubt = (hit.sum(axis=1) > count) | (doubt & hit.any(axis=1)) | shaken
-        return Rows(branches, doubt, settled & prepared.complete & ~shaken, shaken, guesses[:, :, :n])
+        return Rows(branches, doubt, is_settled & prepared.complete & ~shaken, shaken, guesses[:, :, :n])
 
-    why = f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero"
-    return Geometry(NAME, why, prepared.complete, rows=rows, ordered=False)
+    reason = f"{arm.n} joints for a pose of six: {6 - arm.n} virtual joints added at the tool must stay at zero"
+    return Geometry(NAME, reason, prepared.complete, rows=rows, ordered=False)
 
 
-def _solve_six(prepared: method.Elimination, T: Array, *, moved: bool) -> Rows:
+def _solve_six(prepared: method.Elimination, T: Array, *, shake: bool) -> Rows:
     """Branches of six joints; complete where the elimination settled the pose as it stands, by a regular pencil.
 
     Of a target that had to be moved, self-motions and double roots are not where they were.
     """
-    q, doubt, settled, shaken, guesses = method.solve(prepared, T, moved)
-    return Rows(q, doubt | shaken, settled & prepared.complete & ~shaken, shaken, guesses)
+    q, doubt, is_settled, shaken, guesses = method.solve(prepared, T, shake)
+    return Rows(q, doubt | shaken, is_settled & prepared.complete & ~shaken, shaken, guesses)
 
 
 def _with_wrist(arm: Arm, task: Task) -> Geometry | None:
     """Five joints, axes 4 and 5 or 1 and 2 meeting: the closed form with a virtual joint through that point."""
     chain = Chain(arm.link, arm.prismatic)
     for first in (False, True):
-        longer = _with_sixth_joint(reverse_chain(chain) if first else chain, tol.EXACT * arm.reach)
-        if longer is None:
+        extended = _with_sixth_joint(reverse_chain(chain) if first else chain, tol.EXACT * arm.reach)
+        if extended is None:
             continue
-        six = reverse_chain(longer) if first else longer
-        inner = spherical.recognise(from_links(six.link, six.prismatic.tolist()), _POSE)
-        if inner is not None and inner.pairs is not None:
+        six = reverse_chain(extended) if first else extended
+        form = spherical.recognise(from_links(six.link, six.prismatic.tolist()), _POSE)
+        if form is not None and form.pairs is not None:
             axes = "1 and 2" if first else "4 and 5"
-            why = f"5 joints for a pose of six: a virtual joint where axes {axes} meet must stay at zero; {inner.why}"
-            geometry = Geometry("five joints", why, True, _of_five(inner.pairs, first), ordered=inner.ordered)
+            reason = f"5 joints for a pose of six: a virtual joint where axes {axes} meet must stay at zero; {form.why}"
+            geometry = Geometry("five joints", reason, True, _of_five(form.pairs, first), ordered=form.ordered)
             if is_sound(arm, task, geometry):
                 return geometry
     return None

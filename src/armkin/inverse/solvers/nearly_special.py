@@ -44,11 +44,11 @@ RINGS = (1.0, 5.0, 25.0)  # factors on the distance from the class, for seeds on
 
 def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
     """The class nearest to the arm, of those that would fit if its axes moved by `NEAR_DEFECT`, and its distance."""
-    wide, narrow = (planar, elbow, three_joints), (spherical, three_parallel)
+    positions, poses = (planar, elbow, three_joints), (spherical, three_parallel)
     limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
-    classes = [*((module, limit) for module in wide), *((module, tol.NEAR_DEFECT) for module in narrow)]
-    fitting = [alike for module, limit in classes if (alike := module.recognise(arm, task, limit)) is not None]
-    return min(((_class_gap(arm, task, alike), alike) for alike in fitting), key=lambda pair: pair[0], default=None)
+    classes = [*((module, limit) for module in positions), *((module, tol.NEAR_DEFECT) for module in poses)]
+    fitting = [ideal for module, limit in classes if (ideal := module.recognise(arm, task, limit)) is not None]
+    return min(((_class_gap(arm, task, ideal), ideal) for ideal in fitting), key=lambda pair: pair[0], default=None)
 
 
 def recognise(arm: Arm, task: Task) -> Geometry | None:
@@ -56,51 +56,50 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
     # an axis is solved in `armkin.inverse.solvers.tool_axis`
     if task.orientation == "axis" or (nearest := _nearest_class(arm, task)) is None:
         return None
-    gap, alike = nearest
+    gap, ideal = nearest
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
-    if elimination is not None and gap > tol.BLURRED:
-        straight = _by_elimination(arm, task, alike, gap, elimination())
-        if straight is not None:
-            return straight
+    healthy = _by_elimination(arm, task, ideal, gap, elimination()) if elimination and gap > tol.BLURRED else None
+    if healthy is not None:
+        return healthy
 
     def rows(target: Array) -> Rows:
         parts = slices(max(len(target), 1), CHUNK)
-        solved = stack_rows([_solve(source, gap, elimination, target[part]) for part in parts])
-        complete = _has_four_roots(arm, solved.q) if counted else solved.complete
-        return solved._replace(doubt=solved.doubt & ~complete, complete=complete)  # four roots apart are simple ones
+        result = stack_rows([_solve(source, gap, elimination, target[part]) for part in parts])
+        complete = _has_four_roots(arm, result.q) if counts_roots else result.complete
+        return result._replace(doubt=result.doubt & ~complete, complete=complete)  # four roots apart are simple ones
 
-    source = recorded_formula(arm, task, alike)
-    steps = newton_steps.corrected_form(arm, task, gap, alike.pairs) if alike.pairs is not None else None
-    corrected, counted = steps or (None, False)
-    why = f"{alike.why}, but for {gap:.0e} of the reach: closed-form seeds, corrected on the true arm"
-    name, width = f"near {alike.name}", _named_columns(alike)
-    slow = replace(alike, name=name, why=why, complete=False, pairs=None, rows=rows, branches=width)
+    source = recorded_formula(arm, task, ideal)
+    steps = newton_steps.corrected_form(arm, task, gap, ideal.pairs) if ideal.pairs is not None else None
+    corrected, counts_roots = steps or (None, False)
+    why = f"{ideal.why}, but for {gap:.0e} of the reach: closed-form seeds, corrected on the true arm"
+    name, width = f"near {ideal.name}", _named_columns(ideal)
+    fallback = replace(ideal, name=name, why=why, complete=False, pairs=None, rows=rows, branches=width)
     if corrected is None:
-        return slow
-    pencil = position_pencil.recognise(arm, task, alike, why) if counted else None
-    return replace(alike, name=name, why=why, complete=counted, pairs=corrected, doubts=pencil or slow)
+        return fallback
+    pencil = position_pencil.recognise(arm, task, ideal, why) if counts_roots else None
+    return replace(ideal, name=name, why=why, complete=counts_roots, pairs=corrected, doubts=pencil or fallback)
 
 
-def _named_columns(alike: Geometry) -> int | None:
+def _named_columns(ideal: Geometry) -> int | None:
     """How many branches a class has names for; None of one that has no names."""
-    return 1 << sum(bool(label) for label in alike.labels) if alike.labels else None
+    return 1 << sum(bool(label) for label in ideal.labels) if ideal.labels else None
 
 
-def _by_elimination(arm: Arm, task: Task, alike: Geometry, gap: float, general_: Geometry | None) -> Geometry | None:
+def _by_elimination(arm: Arm, task: Task, ideal: Geometry, gap: float, inner: Geometry | None) -> Geometry | None:
     """The elimination, its branches named after those of the similar arm; None if it is not healthy on this arm."""
-    if general_ is None or general_.elimination is None or general_.rows is None or not general_.complete:
+    if inner is None or inner.elimination is None or inner.rows is None or not inner.complete:
         return None
-    if method.left_open(general_.elimination) > SICK_SHARE:
+    if method.left_open(inner.elimination) > SICK_SHARE:
         return None
-    source = recorded_formula(arm, task, alike)
+    source = recorded_formula(arm, task, ideal)
 
     def places(q: Array, target: Array) -> Int:
         parts = slices(max(len(target), 1), NAMED_AT_ONCE)
         return np.concatenate([_branch_places(source, gap, q[part], target[part]) for part in parts])
 
-    why = f"{alike.why}, but for {gap:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
-    geometry = replace(alike, name=general_.name, why=why, pairs=None, branches=_named_columns(alike), places=places)
-    return replace(geometry, rows=name_branches(general_.rows, geometry))
+    why = f"{ideal.why}, but for {gap:.0e} of the reach: numeric elimination, up to 16 branches, named after that class"
+    geometry = replace(ideal, name=inner.name, why=why, pairs=None, branches=_named_columns(ideal), places=places)
+    return replace(geometry, rows=name_branches(inner.rows, geometry))
 
 
 def name_branches(solve: Callable[[Array], Rows], geometry: Geometry) -> Callable[[Array], Rows]:
@@ -127,25 +126,25 @@ def _branch_places(source: Recorded, gap: float, q: Array, target: Array) -> Int
     present = ~np.isnan(q[:, :, 0])
     numbers = np.full(present.shape, -1)
     if q.size:
-        away = newton.distances(source.arm, seed, q)  # (N, B, M)
+        distances = newton.distances(source.arm, seed, q)  # (N, B, M)
         real = miss < 9.0 * gap * np.maximum(1.0, distance(source.arm, source.task, target))[:, None]
-        away = np.where(real[:, :, None] & ~np.isnan(away), away, np.inf)
-        nearest, back = away.argmin(axis=2), away.argmin(axis=1)
-        mutual = np.take_along_axis(back, nearest, axis=1) == np.arange(B)
-        row, place = np.nonzero(mutual & (away.min(axis=2, initial=np.inf) < NAME_DISTANCE))
+        distances = np.where(real[:, :, None] & ~np.isnan(distances), distances, np.inf)
+        nearest, nearest_seed = distances.argmin(axis=2), distances.argmin(axis=1)
+        mutual = np.take_along_axis(nearest_seed, nearest, axis=1) == np.arange(B)
+        row, place = np.nonzero(mutual & (distances.min(axis=2, initial=np.inf) < NAME_DISTANCE))
         numbers[row, nearest[row, place]] = place
     unnamed = present & (numbers < 0)
     return np.where(unnamed, B - 1 + unnamed.cumsum(axis=1), numbers)
 
 
-def _class_gap(arm: Arm, task: Task, alike: Geometry) -> float:
+def _class_gap(arm: Arm, task: Task, ideal: Geometry) -> float:
     """How far the arm is from its class: residual of the seeds for postures of its own, lengths in reaches."""
     q = np.random.default_rng(2).uniform(-2.5, 2.5, (64, arm.n)) * np.where(arm.prismatic, arm.reach / 5, 1.0)
     target = targets_of(task, fk(arm, q), q)
-    seed, _, _ = recorded_formula(arm, task, alike).rows(target)
+    seed, _, _ = recorded_formula(arm, task, ideal).rows(target)
     B = seed.shape[1]
-    rough = newton.misses(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
-    return float(np.quantile(rough.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
+    miss = newton.misses(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
+    return float(np.quantile(miss.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
 
 
 def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | None] | None, target: Array) -> Rows:
@@ -153,12 +152,12 @@ def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | No
     # the error grows with the slide's extension
     gaps = gap * np.maximum(1.0, distance(source.arm, source.task, target))
     if elimination is None:
-        settled, open_ = pairs.settle_pairs(source, gaps, target)
-        if len(rows := np.flatnonzero(open_)):
-            more, settled.doubt[rows] = _by_neighbours(source, gap, gaps[rows], None, target[rows])
-            settled = settled._replace(q=widen_columns(settled.q, more.shape[1]))
-            settled.q[rows] = more
-        return settled
+        result, is_open = pairs.settle_pairs(source, gaps, target)
+        if len(rows := np.flatnonzero(is_open)):
+            q, result.doubt[rows] = _by_neighbours(source, gap, gaps[rows], None, target[rows])
+            result = result._replace(q=widen_columns(result.q, q.shape[1]))
+            result.q[rows] = q
+        return result
     branches = _by_neighbours(source, gap, gaps, elimination, target)
     return Rows(*branches, np.zeros(len(target), bool))
 
@@ -168,8 +167,8 @@ def _by_neighbours(
 ) -> tuple[Array, Bool]:
     """Branches and doubts by the elimination, or by the similar arm's branches at targets around."""
     arm, task = source.arm, source.task
-    seeds, good, doubt = _correct_seeds(source, gap, gaps, target)
-    q = np.where(good[:, :, None], seeds, np.nan)
+    seeds, valid, doubt = _correct_seeds(source, gap, gaps, target)
+    q = np.where(valid[:, :, None], seeds, np.nan)
     rows = np.flatnonzero(doubt)
     if not len(rows):
         return q, doubt
@@ -181,33 +180,33 @@ def _by_neighbours(
         seeds_around = [solver.rows(goals).q]
     else:
         rings = (targets_around(arm, task, goals, size * gaps[rows]) for size in RINGS)
-        seeds_around = [source.rows(moved)[0] for ring in rings for moved in ring]
-    more = _corrected_seeds(arm, task, np.concatenate([seeds[rows], *seeds_around], axis=1), goals, seeds.shape[1])
-    filled = widen_columns(q, more.shape[1])
-    filled[rows] = more
+        seeds_around = [source.rows(goal)[0] for ring in rings for goal in ring]
+    branches = _corrected_seeds(arm, task, np.concatenate([seeds[rows], *seeds_around], axis=1), goals, seeds.shape[1])
+    filled = widen_columns(q, branches.shape[1])
+    filled[rows] = branches
     return filled, doubt
 
 
 def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int) -> Array:
     """Seeds (N, B, n) moved onto the arm: the first `places` in their places, then what else they lead to, once."""
     N, B, n = q.shape
-    flat, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
-    hopeful = np.flatnonzero(newton.misses(arm, task, flat, goals) < tol.HOPELESS)
-    size = np.full(len(flat), np.inf)
-    flat[hopeful], size[hopeful] = newton.correct(arm, task, flat[hopeful], goals[hopeful], steps=20, patience=4)
-    flat[size > tol.SOLUTION] = np.nan
-    q = _filled_columns(flat.reshape(N, B, n), places)
+    seeds, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
+    hopeful = np.flatnonzero(newton.misses(arm, task, seeds, goals) < tol.HOPELESS)
+    size = np.full(len(seeds), np.inf)
+    seeds[hopeful], size[hopeful] = newton.correct(arm, task, seeds[hopeful], goals[hopeful], steps=20, patience=4)
+    seeds[size > tol.SOLUTION] = np.nan
+    q = _filled_columns(seeds.reshape(N, B, n), places)
     for i in range(1, q.shape[1]):
-        again = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.SAME_ANSWER
-        q[again.any(axis=1), i] = np.nan
+        equal = newton.wrapped_distance(arm, q[:, :i], q[:, i : i + 1]) < tol.SAME_ANSWER
+        q[equal.any(axis=1), i] = np.nan
     return _filled_columns(q, places)
 
 
 def _has_four_roots(arm: Arm, q: Array) -> Bool:
     """Whether branches (N, B, 3), nan where there is none, hold four roots, each apart from the others: all, (N,)."""
-    alike = newton.distances(arm, q, q) < tol.APART_ROOTS
+    equal = newton.distances(arm, q, q) < tol.APART_ROOTS
     present = ~np.isnan(q[:, :, 0])
-    return np.asarray((present.sum(axis=1) == 4) & (alike.sum(axis=(1, 2)) == 4))
+    return np.asarray((present.sum(axis=1) == 4) & (equal.sum(axis=(1, 2)) == 4))
 
 
 def _filled_columns(q: Array, places: int) -> Array:
@@ -230,21 +229,21 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
     weak = min(tol.STEADY_VALUE, 1.5 * np.sqrt(gap)) + tol.MIN_VALUE
     limit = 9.0 * gaps[:, None]  # bound of a squared residual: a pair that just misses being real misses by a root
     real = miss < limit
-    for moved in targets_around(arm, task, target, AROUND_FACTOR * gaps):
-        q, miss, doubt_there = source.rows(moved)
-        steady = newton.wrapped_distance(arm, q, seed) < AROUND_FACTOR * gaps[:, None] / weak
-        doubt = doubt | doubt_there | (((miss < limit) | real) & ~steady).any(axis=1)
+    for goal in targets_around(arm, task, target, AROUND_FACTOR * gaps):
+        q, miss, doubt_there = source.rows(goal)
+        near_seed = newton.wrapped_distance(arm, q, seed) < AROUND_FACTOR * gaps[:, None] / weak
+        doubt = doubt | doubt_there | (((miss < limit) | real) & ~near_seed).any(axis=1)
     goals = np.repeat(target, B, axis=0)
-    flat = seed.reshape(-1, n)
-    rough = newton.misses(arm, task, flat, goals)
-    close = np.flatnonzero(rough < tol.HOPELESS)
-    q, size = flat.copy(), np.full(N * B, np.inf)
-    q[close], size[close] = newton.correct(arm, task, flat[close], goals[close])
-    branch, good = q.reshape(N, B, n), (size <= tol.ANSWERED).reshape(N, B)
+    seeds = seed.reshape(-1, n)
+    misses = newton.misses(arm, task, seeds, goals)
+    rows = np.flatnonzero(misses < tol.HOPELESS)
+    q, size = seeds.copy(), np.full(N * B, np.inf)
+    q[rows], size[rows] = newton.correct(arm, task, seeds[rows], goals[rows])
+    branch, valid = q.reshape(N, B, n), (size <= tol.ANSWERED).reshape(N, B)
     # what is unreachable for the similar arm may yet be reached
-    doubt = doubt | (real & ~good).any(axis=1) | ~good.any(axis=1)
+    doubt = doubt | (real & ~valid).any(axis=1) | ~valid.any(axis=1)
     for i in range(B):
         for j in range(i):
-            same = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.SAME_ANSWER
-            doubt |= same & good[:, i] & good[:, j]
-    return branch, good, doubt
+            equal = newton.wrapped_distance(arm, branch[:, i], branch[:, j]) < tol.SAME_ANSWER
+            doubt |= equal & valid[:, i] & valid[:, j]
+    return branch, valid, doubt

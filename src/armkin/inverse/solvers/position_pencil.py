@@ -67,48 +67,48 @@ class PositionPencil:
         """All four roots of targets (N, 3), complex ones by their real parts."""
         p = target @ self.from_base[:3, :3].T + self.from_base[:3, 3]
         right = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.rest
-        main, alone = (np.broadcast_to(fixed, (len(p), 3)).copy() for fixed in self.fixed)
-        main[:, 0] += right @ self.weights[0]
-        alone[:, 0] += right @ self.weights[1]
-        half, cosine, sine = self._half_tangents(main, alone)
-        down = 1.0 / (1.0 + half * half)
-        c, s = (1.0 - half * half) * down, 2.0 * half * down
+        m, e = (np.broadcast_to(fixed, (len(p), 3)).copy() for fixed in self.fixed)
+        m[:, 0] += right @ self.weights[0]
+        e[:, 0] += right @ self.weights[1]
+        t, cosine, sine = self._half_tangents(m, e)
+        cos_square = 1.0 / (1.0 + t * t)
+        c, s = (1.0 - t * t) * cos_square, 2.0 * t * cos_square
         c, s = cosine * c - sine * s, sine * c + cosine * s
 
-        def at(row: Array) -> Any:  # complex
+        def value(row: Array) -> Any:  # complex
             return row[..., 0, None] + row[..., 1, None] * c + row[..., 2, None] * s
 
-        h0, h1 = at(main), at(alone) / self.small
+        h0, h1 = value(m), value(e) / self.small
         gx, gy = (self.V[0, k] * h0 + self.V[1, k] * h1 for k in range(2))
-        x, y, z = (at(row) for row in self.tip)
-        across = x * x + y * y
-        loose = np.abs(across) < tol.NEARBY
-        across = np.where(loose, 1.0, across)
-        c2, s2 = (x * gx + y * gy) / across, (x * gy - y * gx) / across
+        x, y, z = (value(row) for row in self.tip)
+        radius2 = x * x + y * y
+        on_axis = np.abs(radius2) < tol.NEARBY
+        radius2 = np.where(on_axis, 1.0, radius2)
+        c2, s2 = (x * gx + y * gy) / radius2, (x * gy - y * gx) / radius2
         imaginary = np.maximum(_imaginary(c, s), _imaginary(c2, s2))
         q2, q3 = np.arctan2(s2.real, c2.real), np.arctan2(s.real, c.real)
         c2, s2 = np.cos(q2), np.sin(q2)
         tip = np.stack([c2 * x.real - s2 * y.real, s2 * x.real + c2 * y.real, z.real], axis=2)
         tip = tip @ self.arm.link[1][:3, :3].T + self.arm.link[1][:3, 3] / self.scale
         q1 = np.arctan2(p[:, 1], p[:, 0])[:, None] - np.arctan2(tip[..., 1], tip[..., 0])
-        free = (np.hypot(tip[..., 0], tip[..., 1]) < tol.NEARBY) | loose
-        return _Roots(np.stack([q1, q2, q3], axis=2), half.imag == 0.0, imaginary, free.any(axis=1))
+        free = (np.hypot(tip[..., 0], tip[..., 1]) < tol.NEARBY) | on_axis
+        return _Roots(np.stack([q1, q2, q3], axis=2), t.imag == 0.0, imaginary, free.any(axis=1))
 
-    def _half_tangents(self, main: Array, alone: Array) -> tuple[NDArray[Any], Array, Array]:
+    def _half_tangents(self, m: Array, e: Array) -> tuple[NDArray[Any], Array, Array]:
         """Eigenvalues (N, 4): tan((q3 - psi) / 2); cosine and sine of psi, (N, 1): at ``psi + pi`` e is largest."""
-        k, N = self.small, len(main)
+        k, N = self.small, len(m)
         M = np.empty((N, 3, 2, 2))
-        M[:, :, 0, 0], M[:, :, 0, 1] = alone - k * self.tip[0], k * (self.tip[1] - main)
-        M[:, :, 1, 0], M[:, :, 1, 1] = k * (self.tip[1] + main), alone + k * self.tip[0]
-        turn = np.hypot(alone[:, 1], alone[:, 2]) + tol.TINY
-        turn = np.where(alone[:, 0] < 0.0, turn, -turn)[:, None]
-        cosine, sine = alone[:, 1:2] / turn, alone[:, 2:3] / turn
+        M[:, :, 0, 0], M[:, :, 0, 1] = e - k * self.tip[0], k * (self.tip[1] - m)
+        M[:, :, 1, 0], M[:, :, 1, 1] = k * (self.tip[1] + m), e + k * self.tip[0]
+        turn = np.hypot(e[:, 1], e[:, 2]) + tol.TINY
+        turn = np.where(e[:, 0] < 0.0, turn, -turn)[:, None]
+        cosine, sine = e[:, 1:2] / turn, e[:, 2:3] / turn
         c, s = cosine[:, :, None], sine[:, :, None]
-        along, across = c * M[:, 1] + s * M[:, 2], c * M[:, 2] - s * M[:, 1]
+        c_part, s_part = c * M[:, 1] + s * M[:, 2], c * M[:, 2] - s * M[:, 1]
         companion = np.zeros((N, 4, 4))
         companion[:, 0, 2] = companion[:, 1, 3] = 1.0
-        right = np.concatenate([M[:, 0] + along, 2.0 * across], axis=2)
-        companion[:, 2:] = -nudged(np.linalg.solve, M[:, 0] - along, right)
+        right = np.concatenate([M[:, 0] + c_part, 2.0 * s_part], axis=2)
+        companion[:, 2:] = -nudged(np.linalg.solve, M[:, 0] - c_part, right)
         return np.linalg.eigvals(companion), cosine, sine
 
 
@@ -117,10 +117,10 @@ def _imaginary(c: NDArray[Any], s: NDArray[Any]) -> Array:
     return np.abs(np.log(np.maximum(np.abs(c + 1j * s), tol.TINY)))
 
 
-def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | None:
-    """All roots of three turning joints near the class of `alike`, whose branches' places they take."""
+def recognise(arm: Arm, task: Task, ideal: Geometry, why: str) -> Geometry | None:
+    """All roots of three turning joints near the class `ideal`, whose branches' places they take."""
     pencil = PositionPencil(arm, task)
-    seeds = recorded_formula(arm, task, alike)
+    seeds = recorded_formula(arm, task, ideal)
     if pencil.tight < tol.NO_SECOND or np.prod(seeds.axes) != 4:
         return None
 
@@ -129,26 +129,26 @@ def recognise(arm: Arm, task: Task, alike: Geometry, why: str) -> Geometry | Non
         order = _root_order(newton.distances(arm, seeds.rows(target)[0], roots.q))
         return roots._replace(q=np.take_along_axis(roots.q, order[:, :, None], axis=1))
 
-    return Geometry(f"near {alike.name}", why, True, rows=rows, labels=alike.labels, ordered=alike.ordered, branches=4)
+    return Geometry(f"near {ideal.name}", why, True, rows=rows, labels=ideal.labels, ordered=ideal.ordered, branches=4)
 
 
 def _solve_chunk(pencil: PositionPencil, target: Array) -> Rows:
     """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
     arm, task, roots = pencil.arm, pencil.task, pencil.roots(target)
     row, place = np.nonzero(roots.real)
-    better, size = newton.correct(arm, task, roots.q[row, place], target[row])
+    root, size = newton.correct(arm, task, roots.q[row, place], target[row])
     q = np.full_like(roots.q, np.nan)
-    q[row, place] = np.where((size <= tol.ANSWERED)[:, None], better, np.nan)
-    missing = np.isnan(q[:, :, 0])
-    beside = missing & (roots.real | (roots.off < pencil.touching))
-    apart = newton.distances(arm, q, q) + 9.0 * np.eye(4)
-    merged = (apart < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
-    doubt = beside.any(axis=1) | merged | roots.loose
-    return Rows(q, doubt, np.ones(len(target), bool), None, np.where(beside[:, :, None], roots.q, np.nan))
+    q[row, place] = np.where((size <= tol.ANSWERED)[:, None], root, np.nan)
+    absent = np.isnan(q[:, :, 0])
+    near_root = absent & (roots.real | (roots.off < pencil.touching))
+    gaps = newton.distances(arm, q, q) + 9.0 * np.eye(4)
+    meeting = (gaps < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
+    doubt = near_root.any(axis=1) | meeting | roots.loose
+    return Rows(q, doubt, np.ones(len(target), bool), None, np.where(near_root[:, :, None], roots.q, np.nan))
 
 
-def _root_order(away: Array) -> Int:
+def _root_order(distances: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
-    away = np.where(np.isnan(away), np.pi, away)
-    cost = away[:, np.arange(4), ORDERS].sum(axis=2)
+    distances = np.where(np.isnan(distances), np.pi, distances)
+    cost = distances[:, np.arange(4), ORDERS].sum(axis=2)
     return np.asarray(ORDERS[cost.argmin(axis=1)])

@@ -35,20 +35,20 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
         raise redundant_error(arm, surplus, problem)
     effective = rank(arm, task, tol.RANK)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
-        usual = default_task(arm)
+        default = default_task(arm)
         problem = (
             f"{arm.name}: task {task.name} has {task.constraints} constraints, of which its {arm.n} joints can meet "
             f"{effective} at a time:\nthere would be infinitely many solutions or none"
         )
-        if usual in (None, task.name):
+        if default in (None, task.name):
             raise redundant_error(arm, arm.n - effective, problem)
-        raise UsageError(f"{problem}; its usual task is {usual}", robot=arm.name, task=task.name, usual_task=usual)
+        raise UsageError(f"{problem}; its usual task is {default}", robot=arm.name, task=task.name, usual_task=default)
     for recognise in _CLASSES:
         geometry = recognise(arm, task)
         if geometry is not None:
             return task, geometry
-    usual = default_task(arm)
-    hint = f"; its usual task is {usual}" if usual and usual != task.name else ""
+    default = default_task(arm)
+    hint = f"; its usual task is {default}" if default and default != task.name else ""
     joints = f"the {arm.n} joints that are not held" if arm.held else f"its {arm.n} joints"
     hint = hint or ("; hold fewer joints" if arm.held else "")
     raise UsageError(f"{arm.name}: task {task.name} does not fit {joints}{hint}", robot=arm.name, task=task.name)

@@ -35,7 +35,7 @@ class Redundancy(NamedTuple):
     geometry: Geometry  # geometry of the rest
 
     @property
-    def still(self) -> bool:
+    def about_tool_axis(self) -> bool:
         """Whether the redundant joint moves no target: it turns about the tool's z axis, which alone is asked for."""
         return bool(self.joint) and self.task.orientation == "axis"
 
@@ -67,8 +67,8 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
             rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
             with suppress(UsageError):
                 options.append(Redundancy(joint, rest_arm, task, solver(rest_arm, task.name)[1]))
-    closed = [option for option in options if option.geometry.pairs is not None]
-    return next(iter(closed or options[:1]), None)
+    closed_forms = [option for option in options if option.geometry.pairs is not None]
+    return next(iter(closed_forms or options[:1]), None)
 
 
 @lru_cache(maxsize=64)
@@ -78,8 +78,8 @@ def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
         if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
         rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
-        for alike in (module.recognise(rest_arm, free.task, tol.NEAR_DEFECT) for module in (spherical, three_parallel)):
-            if alike is not None and (option := Redundancy(joint, rest_arm, free.task, alike)).by_formula:
+        for ideal in (module.recognise(rest_arm, free.task, tol.NEAR_DEFECT) for module in (spherical, three_parallel)):
+            if ideal is not None and (option := Redundancy(joint, rest_arm, free.task, ideal)).by_formula:
                 return option
     return free
 
@@ -90,9 +90,9 @@ def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
     return task.orientation == "axis" and task.position == 3 and bool(np.abs(offsets).max() <= tol.EXACT)
 
 
-def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
+def move_targets(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
     """Targets (M, m) or (M, 4, 4) as those of the rest, for values t (M,) of the redundant joint."""
-    if free.still:
+    if free.about_tool_axis:
         return target.copy()
     Z = joint_motion(False, -t)
     if free.joint:
@@ -111,30 +111,30 @@ def moved(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
 def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
     """The class of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
     r, solve_others = free.joint, free.geometry.pairs
-    why = f"{free.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
+    reason = f"{free.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
     if solve_others is None:
-        return replace(free.geometry, why=why)
+        return replace(free.geometry, why=reason)
 
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
         pair = prefer[r]
         assert pair is not None
-        candidates = solve_others(moved_entries(arm, free, goal, pair), [*prefer[:r], *prefer[r + 1 :]])
+        candidates = solve_others(move_entries(arm, free, goal, pair), [*prefer[:r], *prefer[r + 1 :]])
         angles = [*(candidates.angles or [None] * len(candidates.pairs))]
         angles.insert(r, None)
         return candidates._replace(pairs=[*candidates.pairs[:r], pair, *candidates.pairs[r:]], angles=angles)
 
-    return replace(free.geometry, pairs=pairs, why=why, doubts=None)
+    return replace(free.geometry, pairs=pairs, why=reason, doubts=None)
 
 
-def moved_entries(arm: Arm, free: Redundancy, goal: list[Entry], pair: Pair) -> list[Entry]:
-    """`moved` of one target's entries, for the cosine and sine of the redundant joint."""
+def move_entries(arm: Arm, free: Redundancy, goal: list[Entry], pair: Pair) -> list[Entry]:
+    """`move_targets` of one target's entries, for the cosine and sine of the redundant joint."""
     c, s = pair
-    if free.still:
+    if free.about_tool_axis:
         return goal
     if free.joint:
         L = arm.link[-1]
-        back = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))
-        return pose.compose(pose.compose(goal, back), pose.constant(L))
+        undo = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))
+        return pose.compose(pose.compose(goal, undo), pose.constant(L))
     L = arm.link[0]
     G = pose.compose(pose.rotate(pose.constant(L), c, arrays.sub(0.0, s)), pose.constant(inverse(L)))
     if free.task.orientation == "full":
@@ -167,7 +167,7 @@ def without_held(arm: Arm, task_name: str | None, held: Mapping[str, float], tar
     if free is None:
         return arm_without(arm, tuple(held.items())), targets
     [value] = held.values()
-    return free.rest, moved(arm, free, targets, np.full(len(targets), value))
+    return free.rest, move_targets(arm, free, targets, np.full(len(targets), value))
 
 
 def redundant_joint(arm: Arm, task_name: str | None) -> str:

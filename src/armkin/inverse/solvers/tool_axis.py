@@ -26,7 +26,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         return None
     six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
     inner = class_of(six)
-    why = f"with a virtual joint about the tool's axis: {inner.why}"
+    reason = f"with a virtual joint about the tool's axis: {inner.why}"
     if inner.pairs is not None:
         solve = inner.pairs
 
@@ -36,7 +36,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
             return candidates._replace(pairs=candidates.pairs[:5], angles=candidates.angles[:5])
 
         ends = tuple(j for j in inner.ends if j < 5)
-        return replace(inner, why=why, pairs=pairs, ends=ends, doubts=None)
+        return replace(inner, why=reason, pairs=pairs, ends=ends, doubts=None)
     solve_rows = inner.rows
     assert solve_rows is not None
 
@@ -49,7 +49,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
         order = projection(arm.prismatic, q).argsort(axis=1)
         return branches._replace(q=np.take_along_axis(q, order[:, :, None], axis=1), guesses=guesses)
 
-    return replace(inner, why=why, rows=rows, unmoved=None, places=None)
+    return replace(inner, why=reason, rows=rows, unmoved=None, places=None)
 
 
 def pose_of(goal: list[Entry]) -> pose.Pose:

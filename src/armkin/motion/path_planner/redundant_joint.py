@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import Redundancy, moved, redundancy
+from armkin.inverse.solvers.redundancy import Redundancy, move_targets, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual_arm
 from armkin.motion.path_planner.held_joints import path_held
@@ -175,7 +175,7 @@ def _count_lacking(
     sample = targets[np.unique(np.linspace(0, len(targets) - 1, count).astype(int))]
     goals = np.repeat(sample[None], len(values), axis=0).reshape(-1, *sample.shape[1:])
     joint_angles = np.repeat(values, len(sample))
-    ik_answers = ik(extra.rest, moved(arm, extra, goals, joint_angles), extra.task.name, examine=False)
+    ik_answers = ik(extra.rest, move_targets(arm, extra, goals, joint_angles), extra.task.name, examine=False)
     legal = ik_answers.within_limits
     conditions = [legal]
     if margins:
