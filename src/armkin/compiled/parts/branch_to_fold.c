@@ -109,7 +109,7 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             off = fmax(off, fabs(c) / most);
         }
     }
-    out->longer = (out->only_ahead ? 1.0 : @gain@) * fmin(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @longest@) - @nearer@;
+    out->span_ratio = (out->only_ahead ? 1.0 : @gain@) * fmin(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @longest@) - @nearer@;
     if (!(off < 1.0)) /* the polynomials are exact on the span if their last coefficients are small */
         return 0;
     for (j = 0; j <= ARM_JOINTS; j++) {
@@ -125,8 +125,8 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
     }
     for (i = 0; i + 1 < ARM_NODES; i++)
         steepest = fmax(steepest, fabs(regular[i + 1] - regular[i]) / (node[i] - node[i + 1]));
-    for (out->alone = 1, i = 0; i + 1 < ARM_NODES; i++) /* no other curve crosses: the Jacobian is singular at no place */
-        out->alone &= regular[i] + regular[i + 1] > 2.0 * steepest * (node[i] - node[i + 1]);
+    for (out->uncrossed = 1, i = 0; i + 1 < ARM_NODES; i++) /* no other curve crosses: the Jacobian is singular at no place */
+        out->uncrossed &= regular[i] + regular[i + 1] > 2.0 * steepest * (node[i] - node[i + 1]);
     return 1;
 }
 
@@ -148,9 +148,9 @@ ARM_SELDOM static double arm_mark_moves(arm_branch *out)
     double widest = 0.0;
     int j;
     for (j = 0; j < ARM_JOINTS; j++)
-        widest = fmax(widest, out->most[j] - out->least[j]);
+        widest = fmax(widest, out->most_way[j] - out->least_way[j]);
     for (j = 0; j < ARM_JOINTS; j++)
-        out->moves[j] = widest >= @wide@ && out->most[j] - out->least[j] > @moved@ * widest;
+        out->moves[j] = widest >= @wide@ && out->most_way[j] - out->least_way[j] > @moved@ * widest;
     return widest;
 }
 
@@ -171,10 +171,10 @@ ARM_SELDOM static int arm_decided(const double *g, arm_branch *out)
                 ends[way] = low;
             }
     for (j = 0; j < ARM_JOINTS; j++) {
-        out->least[j] = INFINITY, out->most[j] = -INFINITY;
+        out->least_way[j] = INFINITY, out->most_way[j] = -INFINITY;
         for (i = 0; i < @fine@; i++) {
             const double x = arm_value(&out->x[0][j], ARM_JOINTS, -ends[0] + i * (ends[0] + ends[1]) / (@fine@ - 1), 0);
-            out->least[j] = fmin(out->least[j], x), out->most[j] = fmax(out->most[j], x);
+            out->least_way[j] = fmin(out->least_way[j], x), out->most_way[j] = fmax(out->most_way[j], x);
         }
     }
     out->motion = arm_mark_moves(out) >= @wide@;
@@ -225,7 +225,7 @@ ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, 
     for (j = 0; j < ARM_JOINTS; j++)
         link.v[j] = sense < 0.0 ? -V[last][j] : V[last][j];
     good = arm_polynomials(q, goal, A[last], straight, &link, g);
-    *span *= good ? link.longer : @shorter@;
+    *span *= good ? link.span_ratio : @shorter@;
     if (!good)
         return 0;
     arm_decided(g, &link);
@@ -240,8 +240,9 @@ ARM_SELDOM static int arm_link(const double *goal, const double *at, int count, 
     met = other && (arm_way(other, q, way), arm_member(&link, way));
     arm_way(at + self, q, way);
     for (j = 0; j < ARM_JOINTS; j++)
-        out->least[j] = fmin(out->least[j], link.least[j] - way[j]), out->most[j] = fmax(out->most[j], link.most[j] - way[j]);
-    out->alone &= link.alone, out->turns |= link.turns;
+        out->least_way[j] = fmin(out->least_way[j], link.least_way[j] - way[j]),
+        out->most_way[j] = fmax(out->most_way[j], link.most_way[j] - way[j]);
+    out->uncrossed &= link.uncrossed, out->turns |= link.turns;
     good = arm_leaves(&link, q, 1, q, ahead);
     return met ? 2 : !good;
 }
@@ -253,7 +254,7 @@ ARM_SELDOM static int arm_chained(const double *goal, const double *at, int coun
     double q[2][ARM_JOINTS * ARM_POINTS], ahead[2][ARM_JOINTS], span[2];
     int links, side, ended[2];
     for (side = 0; side < 2; side++) {
-        span[side] = out->longer * out->span;
+        span[side] = out->span_ratio * out->span;
         ended[side] = !arm_leaves(out, at + self, side ? -1 : 1, q[side], ahead[side]);
     }
     for (links = 1; links <= (out->motion ? @links@ : @few_links@) && !(ended[0] && ended[1]); links++) {

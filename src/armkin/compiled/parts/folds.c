@@ -3,14 +3,14 @@
    others are left to Python. */
 enum { ARM_NODES = @nodes_count@ };
 
-/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. longer: times as long a span is likely to
-   hold. only_ahead: the span begins at t = 0. least, most: how far the joints' ways go. motion: whether it is a self-motion,
-   moves: of which joints, alone: no other curve crosses it, partial: Python does not follow it to its ends, on: which other
-   branches lie on further curves of it. */
+/* x: the joints' ways in powers of t / span, within low <= t <= high; t goes along v. span_ratio: times as long a span is likely
+   to hold. only_ahead: the span begins at t = 0. least_way, most_way: how far the joints' ways go. motion: whether it is a
+   self-motion, moves: of which joints, uncrossed: no other curve crosses it, partial: Python does not follow it to its ends, on:
+   which other branches lie on further curves of it. */
 typedef struct {
-    double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, longer, sigma, second, miss;
-    double least[ARM_JOINTS], most[ARM_JOINTS];
-    int weak, turns, motion, only_ahead, moves[ARM_JOINTS], alone, partial, on[ARM_BRANCHES];
+    double v[ARM_JOINTS], w[ARM_JOINTS], x[ARM_NODES][ARM_JOINTS], low, high, span, span_ratio, sigma, second, miss;
+    double least_way[ARM_JOINTS], most_way[ARM_JOINTS];
+    int weak, turns, motion, only_ahead, moves[ARM_JOINTS], uncrossed, partial, on[ARM_BRANCHES];
 } arm_branch;
 
 #if @sums@
@@ -139,61 +139,61 @@ ARM_SELDOM static int arm_second_order(const double *q, const double *goal, cons
 {
     const int last = ARM_JOINTS - 1;
     const double sigma = S[last], second = S[last - 1];
-    double away[2][ARM_JOINTS], f[2][ARM_JOINTS], more[2][ARM_JOINTS] = {{0.0}}, along[ARM_JOINTS], most = 0.0;
-    double b, size, h, bend = 0.0, ahead, root, before = INFINITY;
-    int i, j, k, step, turning, told = 0;
+    double away[2][ARM_JOINTS], f[2][ARM_JOINTS], correction[2][ARM_JOINTS] = {{0.0}}, second_derivative[ARM_JOINTS];
+    double b, bend, h, longest = 0.0, w_squared = 0.0, exit_distance, other_exit, last_offset = INFINITY;
+    int i, j, k, step, has_turn, decided = 0;
     for (j = 0; j < ARM_JOINTS; j++) {
         out->v[j] = V[last][j];
-        most = fmax(most, fabs(out->v[j]));
+        longest = fmax(longest, fabs(out->v[j]));
         away[0][j] = @way@ * out->v[j], away[1][j] = -away[0][j];
     }
     memset(out->x, 0, sizeof out->x);
-    out->span = 1.2 * @wide@ / most;
+    out->span = 1.2 * @wide@ / longest;
     arm_both_ways(q, goal, r, U, away, f);
     for (k = 0; k < ARM_JOINTS; k++)
-        along[k] = (f[0][k] + f[1][k]) / (@way@ * @way@);
+        second_derivative[k] = (f[0][k] + f[1][k]) / (@way@ * @way@);
     for (j = 0; j < ARM_JOINTS; j++) {
         for (out->w[j] = 0.0, k = 0; k < last; k++)
-            out->w[j] -= V[k][j] * along[k] / S[k];
-        bend += out->w[j] * out->w[j];
+            out->w[j] -= V[k][j] * second_derivative[k] / S[k];
+        w_squared += out->w[j] * out->w[j];
     }
-    b = along[last], size = fmax(fabs(b), @tiny@);
-    turning = sigma * sigma < 2.0 * @solution@ * size;
-    h = turning ? 4.0 * sqrt(@solution@ / size) : 2.0 * @solution@ / sigma;
-    /* where |g| is SOLUTION first: with the sign of b; and against it, or beyond the turn */
-    ahead = 2.0 * @solution@ / (sigma + sqrt(sigma * sigma + 2.0 * @solution@ * size));
-    root = sqrt(fmax(sigma * sigma - 2.0 * @solution@ * size, 0.0));
-    root = turning ? ahead + 2.0 * sigma / size : 2.0 * @solution@ / (sigma + root);
-    out->low = b > 0.0 ? -root : -ahead, out->high = b > 0.0 ? ahead : root;
-    for (step = 0; h <= @series@ && second * h > 4.0 * @solution@ && !told && step < @back@; step++) {
-        double rest[2] = {0.0, 0.0}, pushed[2] = {0.0, 0.0}, off, cubic, quartic, change;
+    b = second_derivative[last], bend = fmax(fabs(b), @tiny@);
+    has_turn = sigma * sigma < 2.0 * @solution@ * bend;
+    h = has_turn ? 4.0 * sqrt(@solution@ / bend) : 2.0 * @solution@ / sigma;
+    /* where |g| is SOLUTION first with the sign of b; other_exit: where against it, or beyond the turn */
+    exit_distance = 2.0 * @solution@ / (sigma + sqrt(sigma * sigma + 2.0 * @solution@ * bend));
+    other_exit = sigma + sqrt(fmax(sigma * sigma - 2.0 * @solution@ * bend, 0.0));
+    other_exit = has_turn ? exit_distance + 2.0 * sigma / bend : 2.0 * @solution@ / other_exit;
+    out->low = b > 0.0 ? -other_exit : -exit_distance, out->high = b > 0.0 ? exit_distance : other_exit;
+    for (step = 0; h <= @series@ && second * h > 4.0 * @solution@ && !decided && step < @back@; step++) {
+        double across[2] = {0.0, 0.0}, correction_squared[2] = {0.0, 0.0}, offset, cubic, quartic, change;
         for (i = 0; i < 2; i++)
             for (j = 0; j < ARM_JOINTS; j++) {
-                away[i][j] = 0.5 * h * h * out->w[j] + (i ? -h : h) * out->v[j] + more[i][j];
-                pushed[i] += more[i][j] * more[i][j];
+                away[i][j] = 0.5 * h * h * out->w[j] + (i ? -h : h) * out->v[j] + correction[i][j];
+                correction_squared[i] += correction[i][j] * correction[i][j];
             }
         arm_both_ways(q, goal, r, U, away, f);
         for (i = 0; i < 2; i++)
             for (k = 0; k < last; k++)
-                rest[i] += f[i][k] * f[i][k];
-        off = sqrt(fmax(rest[0], rest[1])) / second;
+                across[i] += f[i][k] * f[i][k];
+        offset = sqrt(fmax(across[0], across[1])) / second;
         cubic = fabs(0.5 * (f[0][last] - f[1][last]) - sigma * h);
-        quartic = fabs(0.5 * (f[0][last] + f[1][last]) - 0.5 * b * h * h) + ARM_JOINTS * h * off;
+        quartic = fabs(0.5 * (f[0][last] + f[1][last]) - 0.5 * b * h * h) + ARM_JOINTS * h * offset;
         change = (6.0 * cubic + 12.0 * quartic) / (h * h);
-        if (0.5 * h * h * sqrt(bend) + sqrt(fmax(pushed[0], pushed[1])) + off < 0.1 * h) {
-            out->turns = turning && change < 0.2 * size && sigma * sigma < 2.0 * @solution@ * (size - change);
-            told = out->turns || (!turning && sigma * sigma > 2.0 * @solution@ * (size + change));
+        if (0.5 * h * h * sqrt(w_squared) + sqrt(fmax(correction_squared[0], correction_squared[1])) + offset < 0.1 * h) {
+            out->turns = has_turn && change < 0.2 * bend && sigma * sigma < 2.0 * @solution@ * (bend - change);
+            decided = out->turns || (!has_turn && sigma * sigma > 2.0 * @solution@ * (bend + change));
         }
-        if (!(off < 0.5 * before))
+        if (!(offset < 0.5 * last_offset))
             break;
-        for (before = off, i = 0; i < 2; i++)
+        for (last_offset = offset, i = 0; i < 2; i++)
             for (j = 0; j < ARM_JOINTS; j++)
                 for (k = 0; k < last; k++)
-                    more[i][j] -= V[k][j] * f[i][k] / S[k];
+                    correction[i][j] -= V[k][j] * f[i][k] / S[k];
     }
     for (j = 0; j < ARM_JOINTS; j++)
         out->x[1][j] = out->v[j] * out->span, out->x[2][j] = 0.5 * out->w[j] * out->span * out->span;
-    return told;
+    return decided;
 }
 
 /* Whether a posture that far away [rad, reaches] lies on a weak branch's component: `members` in Python. */
@@ -335,7 +335,7 @@ ARM_SELDOM static int arm_folds(const double *goal, const double *q, const doubl
     for (a = 0; a < count; a++) {
         if (!arm_told(at, count, a, goal, T + a, slope + a, one + a))
             return -1;
-        if (one[a].motion && !(one[a].alone && one[a].second > @high@ && @motions@))
+        if (one[a].motion && !(one[a].uncrossed && one[a].second > @high@ && @motions@))
             return -1;
         status = one[a].motion ? 2 : status > one[a].turns ? status : one[a].turns;
     }

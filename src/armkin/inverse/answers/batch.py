@@ -31,18 +31,13 @@ class Goals(NamedTuple):
 
 
 class Seeds(NamedTuple):
-    """Candidate branches of K targets.
+    """Candidate branches of K targets."""
 
-    q: (K, B, n), nan for none. loose: (K, B) whether a candidate depends on the value preferred for a free joint.
-    label: (K, B) in the solver's own numbering. sure: (K, B, n) joints that move along a known self-motion, for one
-    posture of each. simple: (K, B) branches that need no examination, as no closed form doubts them.
-    """
-
-    q: Array
-    loose: Bool
-    label: Int
-    sure: Bool
-    simple: Bool
+    q: Array  # (K, B, n), nan for none
+    loose: Bool  # (K, B) whether a candidate depends on the value preferred for a free joint
+    label: Int  # (K, B) in the solver's own numbering
+    sure: Bool  # (K, B, n) joints that move along a known self-motion, for one posture of each
+    simple: Bool  # (K, B) branches that need no examination, as no closed form doubts them
 
     @classmethod
     def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
@@ -53,23 +48,17 @@ class Seeds(NamedTuple):
 
 
 class Examined(NamedTuple):
-    """The result of examining K targets.
+    """The result of examining K targets."""
 
-    q: (K, W, n) branches, nan past the last.  valid: (K, W).  label: (K, W) branch of each posture in the solver's own
-    numbering.  status: (K,).  free: (K, n).  again, surface: (K,) whether more postures have to be tried, and whether a
-    self-motion is a surface.  moved: (K, n) joints that move along self-motions that are not fully known.  beyond: (K,)
-    whether all nearby roots lie beyond a fold.
-    """
-
-    q: Array
-    valid: Bool
-    label: Int
-    status: NDArray[np.int8]
-    free: Bool
-    again: Bool
-    surface: Bool
-    moved: Bool
-    beyond: Bool
+    q: Array  # (K, W, n) branches, nan past the last
+    valid: Bool  # (K, W)
+    label: Int  # (K, W) branch of each posture in the solver's own numbering
+    status: NDArray[np.int8]  # (K,)
+    free: Bool  # (K, n)
+    again: Bool  # (K,) whether more postures have to be tried
+    surface: Bool  # (K,) whether a self-motion is a surface
+    moved: Bool  # (K, n) joints that move along self-motions that are not fully known
+    beyond: Bool  # (K,) whether all nearby roots lie beyond a fold
 
 
 class Batch(NamedTuple):

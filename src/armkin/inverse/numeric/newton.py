@@ -183,15 +183,13 @@ class Linear(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """Smallest singular values of candidates (K, M), or lower bounds from `FOLDED` on; of those below it how many
-    directions they lose (K, M) and right singular vectors (K, M, n, n). weak: these alone, in the rows that place
-    (K, M) says, -1 for the others."""
+    """What candidates (K, M) lose; those below `FOLDED` are weak."""
 
-    sigma: Array
-    nullity: Int
-    V: Array
-    weak: Linear
-    place: Int
+    sigma: Array  # (K, M) smallest singular value, from `FOLDED` on a lower bound of it
+    nullity: Int  # (K, M) how many directions are lost, of the weak
+    V: Array  # (K, M, n, n) right singular vectors of the weak
+    weak: Linear  # what is known of the weak alone
+    place: Int  # (K, M) row of `weak`, -1 for the others
 
 
 def lost_directions(arm: Arm, task: Task, q: Array, chosen: Bool, target: Array) -> Lost:

@@ -138,17 +138,13 @@ def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
 
 
 class Columns(NamedTuple):
-    """Branches of some targets as arrays (B, N), without choice of their copies.
-
-    values: n arrays (B, N) [rad | mm], modulo whole turns; miss: (B, N) squared residual; valid: (B, N); left: targets
-    on an edge, whose branches may be wrong.
-    """
+    """Branches of some targets as arrays (B, N), without choice of their copies."""
 
     rows: slice
-    values: list[Array]
-    miss: Array
-    valid: Bool
-    left: Int
+    values: list[Array]  # n arrays (B, N) [rad | mm], modulo whole turns
+    miss: Array  # (B, N) squared residual
+    valid: Bool  # (B, N)
+    left: Int  # targets on an edge, whose branches may be wrong
 
 
 def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool = False) -> Iterator[Columns]:

@@ -18,23 +18,17 @@ AT_ONCE = 1024  # targets examined in one call
 
 
 class _Doubts(NamedTuple):
-    """K targets on an edge: rows of the batch (K,), and their candidates (K, B, n) from the formulas.
+    """K targets on an edge and their candidates from the formulas."""
 
-    first: candidates with the values of `near` for free joints; other: with other values, nan where these change
-    nothing; loose: (K, B) which candidates they change; free: (K,) whether a joint is free; ends: (K,) whether joints
-    in the geometry's `ends` are free; narrow: (K,) whether only a range of values without `near` has solutions;
-    simple: (K, B) branches on no edge, of targets that `near` does not solve.
-    """
-
-    rows: Int
-    tight: Array
-    first: Array
-    other: Array
-    loose: Bool
-    free: Bool
-    ends: Bool
-    narrow: Bool
-    simple: Bool
+    rows: Int  # (K,) rows of the batch
+    tight: Array  # (K, B, n) candidates as the formulas give them
+    first: Array  # (K, B, n) candidates with the values of `near` for free joints
+    second: Array  # (K, B, n) candidates with other values for these, nan where they change nothing
+    loose: Bool  # (K, B) which candidates they change
+    free: Bool  # (K,) whether a joint is free
+    ends: Bool  # (K,) whether joints in the geometry's `ends` are free
+    narrow: Bool  # (K,) whether only a range of values without `near` has solutions
+    simple: Bool  # (K, B) branches on no edge, of targets that `near` does not solve
 
 
 def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Batch:
@@ -54,7 +48,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
         if len(part := np.flatnonzero(pending & doubts.narrow)):  # another range of values may have solutions
             narrow = rows[part]
             doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
-            doubts.other[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
+            doubts.second[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
         left, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, pending)
         # seeds with the preferred values for free joints, and those that other values change
         seed_sets = [first, second] if loose.any() else [first]
@@ -82,7 +76,7 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
         return settled
     part = np.flatnonzero(doubts.free & ~doubts.ends)
-    q = np.stack([doubts.first[part], doubts.other[part]], axis=1)
+    q = np.stack([doubts.first[part], doubts.second[part]], axis=1)
     for _ in range(2):
         if not len(part):
             break
@@ -130,7 +124,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         rows=rows,
         tight=np.where(is_wrong[:, :, None], np.nan, tight),
         first=np.where(is_wrong[:, :, None], np.nan, tight),
-        other=np.full(tight.shape, np.nan),
+        second=np.full(tight.shape, np.nan),
         loose=np.zeros(tight.shape[:2], bool),
         free=np.asarray((free > 0.0).any(axis=1)),
         ends=np.zeros(len(rows), bool),
@@ -152,7 +146,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
             single &= ~doubts.narrow[part[lost]]
             doubts.free[part[lost]], second[lost[single]] = ~single, np.nan  # one possible value is no freedom
         doubts.first[part] = np.where(is_plain[part][:, :, None], doubts.first[part], first)
-        doubts.other[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
+        doubts.second[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         differences = np.minimum(differences, np.abs(differences - 2 * np.pi))[:, :, list(runner.geometry.ends)]
         doubts.ends[part] = (differences > tol.SAME).any(axis=(1, 2))
     return doubts

@@ -28,17 +28,13 @@ PAIR_DISTANCE = 10.0 * tol.SAME  # closer branches [rad, reaches] are examined c
 
 
 class Doubted(NamedTuple):
-    """K targets on an edge and their results from formulas: rows of the batch (K,), candidates q (K, B, n), squared
-    residuals miss (K, B), and which candidates are on an edge (K, B).
+    """K targets on an edge and their results from formulas."""
 
-    plain: (K,) whether no joint is free and `near` does not solve the target.
-    """
-
-    rows: Int
-    q: Array
-    miss: Array
-    edge: Bool
-    plain: Bool
+    rows: Int  # (K,) rows of the batch
+    q: Array  # (K, B, n) candidates
+    miss: Array  # (K, B) squared residuals
+    edge: Bool  # (K, B) which candidates are on an edge
+    plain: Bool  # (K,) whether no joint is free and `near` does not solve the target
 
 
 def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Int:

@@ -6,6 +6,8 @@ it, and nothing else is.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool
@@ -19,55 +21,67 @@ FEW_LINKS = 4  # curves on each side of a posture whose component leaves a short
 LINKS = 16  # curves on each side of a posture, each as long as the last one lets expect
 
 
-def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> tuple[Bool, Bool, Bool, Bool]:
-    """Which postures peers (M, K, n) lie on the components of q (M, n), and of which (M,) both ends are known.
+class Followed(NamedTuple):
+    """What is known of the components of M postures after following them; of shape (M,) where no other is given."""
 
-    Those on which the residual grows, and those that leave a shortened span, are followed both ways until they end, or
-    close, the latter at most as far as tells that they are manifolds: then `at` tells of them, too. Also on which of
-    these (M,) no other curve crosses, and the joints (M, n) that move.
+    members: Bool  # (M, K) which peers lie on the component
+    known: Bool  # whether it was followed far enough to tell what it is
+    manifold: Bool  # whether it is a self-motion manifold
+    boundary: Bool  # whether it is a boundary; where it is neither, it is an isolated root
+    joints: Bool  # (M, n) joints that move along a manifold
+    ended: Bool  # whether both of its ends are known
+    uncrossed: Bool  # whether both are, and no other curve crosses in between
+
+
+def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> Followed:
+    """The components of postures q (M, n), whose structures are `at`, and which of their peers (M, K, n) lie on them.
+
+    Components on which the residual grows, and those that leave a shortened span, are followed both ways until they
+    end or close; the latter at most as far as tells that they are manifolds.
     """
-    rows = np.arange(len(q))
-    open_ = ~at.known & at.followed
-    inside = members(at, rows, newton.difference(arm, peers, q[:, None]))
+    postures = np.arange(len(q))
+    in_chains = members(at, postures, newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
+    known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
+    joints, uncrossed = at.joints.copy(), at.uncrossed.copy()
     residual = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    open_ |= at.known & at.manifold & ~ended & (residual > tol.CLOSED)
-    left = np.flatnonzero(open_ & (at.second > tol.HIGH))
-    if not len(left):
-        return inside, ended, ended & at.alone, at.joints
-    joints, alone = at.joints.copy(), at.alone.copy()
-    least, most = at.least.copy(), at.most.copy()
-    curve, span = np.tile(left, 2), np.tile((at.longer * at.span)[left], 2)
-    start, ahead = leave_spans(arm, at, curve, q[curve], np.concatenate([at.v[left], -at.v[left]]))
-    finished = np.isnan(start[:, 0])
-    going = np.flatnonzero(~finished)
+    goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.CLOSED), at.followed)
+    begun = np.flatnonzero(goes_on & (at.second > tol.HIGH))
+    if not len(begun):
+        return Followed(in_chains, known, manifold, boundary, joints, ended, ended & uncrossed)
+    least_way, most_way = at.least_way.copy(), at.most_way.copy()
+    # two chains each: the first half of these arrays begins along v, the second against it
+    posture, span = np.tile(begun, 2), np.tile((at.span_ratio * at.span)[begun], 2)
+    end, heading = leave_spans(arm, at, posture, q[posture], np.concatenate([at.v[begun], -at.v[begun]]))
+    finished = np.isnan(end[:, 0])
+    chains = np.flatnonzero(~finished)
     for count in range(1, LINKS + 1):
-        if not len(going):
+        if not len(chains):
             break
-        row, rows, last = curve[going], np.arange(len(going)), start[going]
-        link = stretch(arm, task, last, target[row], span[going], ahead[going])
-        good = link.followed & (link.second > tol.HIGH)
-        span[going] *= link.longer
-        onto, onwards = leave_spans(arm, link, rows, last, link.v)
+        row, start = posture[chains], end[chains]
+        link = stretch(arm, task, start, target[row], span[chains], heading[chains])
+        holds = link.followed & (link.second > tol.HIGH)
+        span[chains] *= link.span_ratio
+        link_end, link_heading = leave_spans(arm, link, np.arange(len(chains)), start, link.v)
         # a curve closes where its two sides meet: a step may pass where the other was, or now is
-        other = (going + len(left)) % len(curve)
-        before = start[other]
-        start[going[good]], ahead[going[good]] = onto[good], onwards[good]
-        others = np.concatenate([peers[row], before[:, None], start[other][:, None]], axis=1)
-        passed = members(link, rows, newton.difference(arm, others, last[:, None])) & good[:, None]
-        np.logical_or.at(inside, row, passed[:, :-2])
-        shift = newton.difference(arm, last, q[row])
-        np.minimum.at(least, row[good], (shift + link.least)[good])
-        np.maximum.at(most, row[good], (shift + link.most)[good])
-        np.logical_and.at(alone, row[good], link.alone[good])
-        np.logical_or.at(at.boundary, row[good], link.boundary[good])
-        finished[going] = good & np.isnan(onto[:, 0])
-        met = passed[:, -2:].any(axis=1)
-        finished[going[met]] = finished[other[met]] = True
-        enough = ~at.known & ((count == FEW_LINKS) | ((most - least).max(axis=1) >= tol.REACH))
-        going = going[~(finished[going] | enough[row]) & (link.second > tol.HIGH)]
-    extent, ended[left] = (most - least)[left], finished.reshape(2, -1).all(axis=0)
-    at.manifold[left] = extent.max(axis=1) >= tol.REACH
-    at.known[left], at.boundary[left] = at.manifold[left] | ended[left], at.boundary[left] & ~at.manifold[left]
-    joints[left] = at.manifold[left, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
-    return inside, ended, ended & alone, joints
+        opposite = (chains + len(begun)) % len(posture)
+        opposite_start = end[opposite]
+        end[chains[holds]], heading[chains[holds]] = link_end[holds], link_heading[holds]
+        others = np.concatenate([peers[row], opposite_start[:, None], end[opposite][:, None]], axis=1)
+        passed = members(link, np.arange(len(chains)), newton.difference(arm, others, start[:, None])) & holds[:, None]
+        np.logical_or.at(in_chains, row, passed[:, :-2])
+        shift = newton.difference(arm, start, q[row])
+        np.minimum.at(least_way, row[holds], (shift + link.least_way)[holds])
+        np.maximum.at(most_way, row[holds], (shift + link.most_way)[holds])
+        np.logical_and.at(uncrossed, row[holds], link.uncrossed[holds])
+        np.logical_or.at(boundary, row[holds], link.boundary[holds])
+        finished[chains] = holds & np.isnan(link_end[:, 0])
+        closes = passed[:, -2:].any(axis=1)
+        finished[chains[closes]] = finished[opposite[closes]] = True
+        enough = ~at.known & ((count == FEW_LINKS) | ((most_way - least_way).max(axis=1) >= tol.REACH))
+        chains = chains[~(finished[chains] | enough[row]) & (link.second > tol.HIGH)]
+    extent, ended[begun] = (most_way - least_way)[begun], finished.reshape(2, -1).all(axis=0)
+    manifold[begun] = extent.max(axis=1) >= tol.REACH
+    known[begun], boundary[begun] = manifold[begun] | ended[begun], boundary[begun] & ~manifold[begun]
+    joints[begun] = manifold[begun, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
+    return Followed(in_chains, known, manifold, boundary, joints, ended, ended & uncrossed)

@@ -42,293 +42,311 @@ def examine(
     and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
     that loses singular ones: more are asked for these and for what is singular, as of lost ones for incomplete (K,).
     """
-    state = _settle(goals, seeds, tol.SEED)
-    again = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
+    state = _settle_seeds(goals, seeds, tol.SEED)
+    retry = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
         first, last = state.moved.argmax(axis=1), goals.arm.n - 1 - state.moved[:, ::-1].argmax(axis=1)
-        more_of = again | state.moved.any(axis=1) & (last - first > 2)
+        wants_more = retry | state.moved.any(axis=1) & (last - first > 2)
     else:
-        more_of = again | unsettled | (state.status != Status.EXACT)
-    if not more_of.any():
-        return state._replace(again=again)
-    rows = np.flatnonzero(more_of)
-    lost = again if incomplete is None else again | incomplete
-    more_q, labels, open_ = more(goals.target[rows], goals.near[rows], lost[rows])
+        wants_more = retry | unsettled | (state.status != Status.EXACT)
+    if not wants_more.any():
+        return state._replace(again=retry)
+    rows = np.flatnonzero(wants_more)
+    lost = retry if incomplete is None else retry | incomplete
+    more_candidates, labels, wants_starts = more(goals.target[rows], goals.near[rows], lost[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
-        open_ |= state.surface[rows]
-    if open_.any():
-        starts = newton.many_starts(goals.arm, goals.task, goals.target[rows], open_)
-        more_q, labels = np.concatenate([more_q, starts], axis=1), np.append(labels, np.zeros(starts.shape[1], int))
-    present = again[rows] | ~np.isnan(more_q[:, :, 0]).all(axis=1)
-    rows, more_q = rows[present], more_q[present]
+        wants_starts |= state.surface[rows]
+    if wants_starts.any():
+        starts = newton.many_starts(goals.arm, goals.task, goals.target[rows], wants_starts)
+        labels = np.append(labels, np.zeros(starts.shape[1], int))
+        more_candidates = np.concatenate([more_candidates, starts], axis=1)
+    has_candidates: Bool = np.asarray(~np.isnan(more_candidates[:, :, 0]).all(axis=1))
+    useful = retry[rows] | has_candidates
+    retry[rows] &= has_candidates  # nothing anywhere near: out of reach, and known to be
+    rows, more_candidates = rows[useful], more_candidates[useful]
     if not len(rows):
-        return state._replace(again=again)
-    again[rows] &= ~np.isnan(more_q[:, :, 0]).all(axis=1)  # nothing anywhere near: out of reach, and known to be
-    whose = np.concatenate([state.label[rows], np.broadcast_to(labels, more_q.shape[:2])], axis=1)
-    second = _settle(goals.of(rows), Seeds.of(np.concatenate([state.q[rows], more_q], axis=1), whose), tol.HOPELESS)
-    return replace_rows(state, rows, second)._replace(again=again)
+        return state._replace(again=retry)
+    label = np.concatenate([state.label[rows], np.broadcast_to(labels, more_candidates.shape[:2])], axis=1)
+    all_seeds = Seeds.of(np.concatenate([state.q[rows], more_candidates], axis=1), label)
+    return replace_rows(state, rows, _settle_seeds(goals.of(rows), all_seeds, tol.HOPELESS))._replace(again=retry)
 
 
 class _Candidates(NamedTuple):
-    """Candidates q (K, M, n), `near` the first, with labels and residuals (K, M).
+    """Candidates of K targets, `near` the first of each."""
 
-    sure: (K, M, n) joints that move along those that are known to lie on a self-motion, one posture of each.
-    simple: (K, M) branches as they stand.
-    """
-
-    q: Array
-    label: Int
-    size: Array
-    sure: Bool
-    simple: Bool
+    q: Array  # (K, M, n)
+    label: Int  # (K, M)
+    size: Array  # (K, M) residual
+    sure: Bool  # (K, M, n) joints that move along a known self-motion, for one posture of each
+    simple: Bool  # (K, M) branches that need no examination
 
 
-class _Groups:
-    """Which candidates are one, and what: a candidate of each target at a time leads those that are one with it."""
+class _Components:
+    """What components of the solution set candidates lie on, and what is listed of these."""
 
-    def __init__(self, goals: Goals, at: _Candidates, lost: newton.Lost, rests: Bool) -> None:
+    def __init__(self, goals: Goals, candidates: _Candidates, lost: newton.Lost, rests: Bool) -> None:
         """rests: (K, M) those that no push takes along a self-motion."""
-        self.goals, self.at = goals, at
+        self.goals, self.candidates = goals, candidates
         self.lost, self.rests = lost, rests
-        K, M, n = at.q.shape
-        self.valid: Bool = np.asarray(at.size <= tol.SOLUTION)
-        on_motion: Bool = np.asarray(at.sure.any(axis=2))
+        (K, M, n), simple = candidates.q.shape, candidates.simple
+        on_motion: Bool = np.asarray(candidates.sure.any(axis=2))
+        # of each candidate, (K, M) or (K, M, n):
+        self.valid: Bool = np.asarray(candidates.size <= tol.SOLUTION)
         # where one direction alone is lost a joint that rests there and on a part of the self-motion rests on all of it
         self.resting: Bool = (lost.nullity == 1)[:, :, None] & (np.abs(lost.V[:, :, -1]) < tol.SOLUTION)
         # `near` leads its group, else the most exact candidate: one between two branches must not join them
-        self.rank = np.maximum(at.size, tol.EQUAL_RESIDUALS)
+        self.rank = np.maximum(candidates.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
-        self.open: Bool = self.valid & ~at.simple  # candidates of no group yet
-        self.weak: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on_motion
+        self.ungrouped: Bool = self.valid & ~simple  # whether it is in no group yet
+        self.near_singular: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on_motion
         lost.sigma[on_motion] = 0.0
-        self.asked: Bool = ~(self.open & self.weak)  # what component it is on; pushed: whether pushes move it
-        self.known, self.moves, self.pushed = on_motion.copy(), on_motion.copy(), self.asked.copy()
-        self.which, self.edge = at.sure.copy(), np.zeros((K, M), bool)
-        self.ended, self.alone = np.zeros((K, M), bool), on_motion.copy()
-        # which candidates are one with each: rows of `component`, the first for those of which that is not known
-        self.place, self.component = np.zeros((K, M), np.int64), np.zeros((1, M), bool)
-        self.chosen, self.curve = at.simple.copy(), np.zeros((K, M, n), bool)
-        self.free, self.singular, self.double = np.zeros((K, n), bool), np.zeros(K, bool), np.zeros(K, bool)
+        self.followed: Bool = ~(self.ungrouped & self.near_singular)  # whether its component is followed, if need be
+        self.pushed = self.followed.copy()  # whether it is pushed, if need be
+        self.known = on_motion.copy()  # whether its component is known
+        self.on_manifold = on_motion.copy()  # whether that is a self-motion manifold
+        self.moving_joints = candidates.sure.copy()  # those that move along the manifold
+        self.ended = np.zeros((K, M), bool)  # whether both ends of the component are known
+        self.uncrossed = on_motion.copy()  # whether they are, and no other curve crosses in between
+        self.is_boundary = np.zeros((K, M), bool)  # whether two roots merge there
+        self.component_row = np.zeros((K, M), np.int64)  # its row of `components`, 0 as long as that is not known
+        self.components = np.zeros((1, M), bool)  # (rows, M) which candidates of a target are one
+        self.chosen, self.chosen_joints = simple.copy(), np.zeros((K, M, n), bool)  # what is listed, and moves there
+        # of each target:
+        self.free_joints, self.has_manifold, self.has_boundary = np.zeros((K, n), bool), *np.zeros((2, K), bool)
 
     @cached_property
     def tube(self) -> Array:
         """How far a posture of residual `SOLUTION` may be off the curve through candidates (K, M) [rad, reaches]:
         `SOLUTION` over the second smallest singular value, where that is small."""
         place, S, n = self.lost.place, self.lost.weak.S, self.goals.arm.n
-        widths, weak = np.zeros(place.shape), place >= 0
+        widths, has_values = np.zeros(place.shape), place >= 0
         if S.shape[1] >= n > 1:
-            widths[weak] = tol.SOLUTION / np.maximum(S[place[weak], n - 2], tol.WEAK)
+            widths[has_values] = tol.SOLUTION / np.maximum(S[place[has_values], n - 2], tol.WEAK)
         return widths
 
-    def _plain(self) -> None:
-        """What needs no comparison one by one: regular candidates with none close by, isolated roots and boundaries
-        that are alone on their components or two, and self-motions that were known where nothing else may be on them.
-        """
-        self.open &= ~(self.component[self.place] & self.at.simple[:, None]).any(axis=2)  # branches as they stand
-        valid, sigma, M = self.open, self.lost.sigma, self.open.shape[1]
-        sure: Bool = np.asarray(self.at.sure.any(axis=2))
-        mine, apart = valid & ~sure, ~np.eye(M, dtype=bool)
-        close = np.zeros((len(valid), M, M), bool)
-        k, i, j = np.nonzero(mine[:, :, None] & mine[:, None] & apart)
-        away = np.abs(newton.difference(self.goals.arm, self.at.q[k, i], self.at.q[k, j])).max(axis=1, initial=0.0)
-        close[k, i, j] = away < tol.CLOSE_BY
-        weak = mine & self.weak
-        decided = weak & (self.place > 0) & ~self.moves
-        doubtful = weak & ~(decided & self.known & (sigma >= tol.SOLUTION))  # may be on a self-motion
-        alone = valid & np.where(sure, ~doubtful.any(axis=1, keepdims=True), ~weak & ~close.any(axis=2))
-        undecided = (weak & (self.moves | ~self.pushed)).any(axis=1) | (sure.any(axis=1) & doubtful.any(axis=1))
-        decided &= ~np.asarray(undecided)[:, None]
-        rows = np.flatnonzero(decided.any(axis=1))
-        if len(rows):
-            mine, certain = decided[rows], self.known[rows]
-            alike = self.component[self.place[rows]] & valid[rows, None] & apart & mine[:, :, None]
-            mine &= (alike == alike.swapaxes(1, 2)).all(axis=2) & ~(close[rows] & ~mine[:, None]).any(axis=2)
-            mine &= ~(alike & (certain[:, :, None] != certain[:, None])).any(axis=2)
-            mine &= (alike.sum(axis=2) < 2) & ~alike[:, :, 0]
-            mine &= (~alike | mine[:, None]).all(axis=2)
-            # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            size = np.maximum(self.at.size[rows], np.where(certain, tol.CLOSED, 0.0))
-            rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
-            leads = mine & ~(alike & (rank[:, None] < rank[:, :, None])).any(axis=2)
-            self.chosen[rows] |= leads
-            self.double[rows] |= (leads & self.edge[rows]).any(axis=1)
-            decided[rows] = mine
-        self.chosen |= alone
-        self.open &= ~(alone | decided)
-        self.curve |= alone[:, :, None] & self.which & sure[:, :, None]
-        self.singular |= (alone & sure).any(axis=1)
-        self.free |= self.curve.any(axis=1)
-
-    def _ask(self, k: Int, b: Int) -> None:
-        """What components these candidates lie on that lose one direction, if that is not known."""
-        (arm, task, target, _), q = self.goals, self.at.q
-        unasked = ~self.asked[k, b]
-        if not unasked.any():
+    def _follow(self, k: Int, b: Int) -> None:
+        """Follow the components of those of these candidates that lose one direction, if that is not done."""
+        (arm, task, target, _), q = self.goals, self.candidates.q
+        unfollowed = ~self.followed[k, b]
+        if not unfollowed.any():
             return
-        k, b = k[unasked], b[unasked]
-        self.asked[k, b] = True
-        single = self.lost.nullity[k, b] < 2
-        if single.any():
-            i, c = k[single], b[single]
+        k, b = k[unfollowed], b[unfollowed]
+        self.followed[k, b] = True
+        loses_one = self.lost.nullity[k, b] < 2
+        if loses_one.any():
+            i, c = k[loses_one], b[loses_one]
             local = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
-            same, self.ended[i, c], self.alone[i, c], joints = chains.follow(arm, task, local, q[i, c], q[i], target[i])
-            self.known[i, c], self.moves[i, c], self.which[i, c] = local.known, local.manifold, joints
-            self.edge[i, c] = local.boundary
-            self.place[i, c] = np.where(local.known, len(self.component) + np.arange(len(i)), 0)
-            self.component = np.concatenate([self.component, same])
+            curve = chains.follow(arm, task, local, q[i, c], q[i], target[i])
+            self.known[i, c], self.on_manifold[i, c] = curve.known, curve.manifold
+            self.moving_joints[i, c], self.is_boundary[i, c] = curve.joints, curve.boundary
+            self.ended[i, c], self.uncrossed[i, c] = curve.ended, curve.uncrossed
+            self.component_row[i, c] = np.where(curve.known, len(self.components) + np.arange(len(i)), 0)
+            self.components = np.concatenate([self.components, curve.members])
         self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
     def _push(self, k: Int, b: Int) -> None:
-        """Whether these candidates move, of which `_ask` did not tell."""
-        self._ask(k, b)
+        """Push those of these candidates whose components `_follow` does not tell: do they move?"""
+        self._follow(k, b)
         unpushed = ~self.pushed[k, b]
         if unpushed.any():
             k, b = k[unpushed], b[unpushed]
             self.pushed[k, b] = True
             (arm, task, target, _), lost = self.goals, np.maximum(self.lost.nullity[k, b], 1)
-            motion = self_motions.self_motion(arm, task, self.at.q[k, b], self.lost.V[k, b], lost, target[k])
-            self.moves[k, b], self.which[k, b] = motion
+            motion = self_motions.self_motion(arm, task, self.candidates.q[k, b], self.lost.V[k, b], lost, target[k])
+            self.on_manifold[k, b], self.moving_joints[k, b] = motion
 
     def _compare(self, k: Int, b: Int) -> None:
-        """Which candidates are one with these, whose component is not known."""
-        candidates, (arm, task, target, _), sigma = self.at, self.goals, self.lost.sigma
-        self.place[k, b] = len(self.component) + np.arange(len(k))
-        alike, away = high_order_roots.equal_candidates(arm, task, candidates.q, k, b, sigma, candidates.size, target)
-        self.edge[k, b] = (alike & self.valid[k] & (away > tol.SAME)).any(axis=1) | (sigma[k, b] < tol.DOUBLE)
-        self.component = np.concatenate([self.component, alike])
+        """Find the candidates that are one with these, whose components are not known."""
+        (q, _, size, *_), (arm, task, target, _), sigma = self.candidates, self.goals, self.lost.sigma
+        self.component_row[k, b] = len(self.components) + np.arange(len(k))
+        alike, distance = high_order_roots.equal_candidates(arm, task, q, k, b, sigma, size, target)
+        has_twin = (alike & self.valid[k] & (distance > tol.SAME)).any(axis=1)
+        self.is_boundary[k, b] = has_twin | (sigma[k, b] < tol.DOUBLE)
+        self.components = np.concatenate([self.components, alike])
 
-    def _lead(self, k: Int, b: Int) -> None:
-        """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
-        self._push(k, b)
-        if (uncompared := ~self.known[k, b] & (self.place[k, b] == 0)).any():
-            self._compare(k[uncompared], b[uncompared])
-        arm, near = self.goals.arm, self.goals.near
-        q, label, size = self.at.q, self.at.label, self.at.size
-        sure = self.known[k, b]
-        exact = np.where(sure[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # a known component's as in `_plain`
-        away = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
-        group: Bool = np.asarray(self.component[self.place[k, b]])
-        unlisted = ~(group & self.at.simple[k]).any(axis=1)
-        self._inherit(k, b, group)
-        moving, joints = self.moves[k, b], self.which[k, b]
-        group &= self.open[k]
-        on = self._on_motion(k, b, away, group | ~self.open[k]) | (group & (sure & moving)[:, None])
-        on[np.arange(len(k)), b] = True
-        mine = on | group  # what is one with it along a curve beside the self-motion is not on that
-        self.open[k] &= ~mine
-        self.double[k] |= self.edge[k, b]
-        self.singular[k] |= moving
-        self.free[k] |= joints & moving[:, None]
-        # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
-        motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
-        pick = np.where(moving[:, None], np.where(on, motion, np.inf), np.where(mine, exact, np.inf)).argmin(axis=1)
-        leads = np.flatnonzero(label[k, b] == OWN_LABEL)
-        pick[leads] = b[leads]
-        self.chosen[k, pick] = unlisted
-        self.curve[k, pick] = joints & moving[:, None]
-        for array in (self.known, self.moves, self.place, self.ended, self.alone):
-            array[k, pick] = array[k, b]
-        if len(leads):  # named like the candidate of its group that is closest to it
-            alike = np.where(mine[leads] & (label[k[leads]] != OWN_LABEL), motion[leads], np.inf)
-            twin = alike.argmin(axis=1)
-            label[k[leads], b[leads]] = np.where(np.isinf(alike.min(axis=1)), OWN_LABEL, label[k[leads], twin])
-
-    def _inherit(self, k: Int, b: Int, alike: Bool) -> None:
-        """Components (m, M) that a manifold begun at another of their candidates has as its own are that manifold.
+    def _inherit_manifolds(self, k: Int, b: Int, alike: Bool) -> None:
+        """Components (m, M) become the manifold that begins at another of their candidates and has their own on it.
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
         """
-        beside = (self.tube[k, b] > tol.TURNED) & self.known[k, b] & ~self.moves[k, b]
-        if not beside.any():
+        is_vague = (self.tube[k, b] > tol.TURNED) & self.known[k, b] & ~self.on_manifold[k, b]
+        if not is_vague.any():
             return
-        i, c = np.nonzero(alike & beside[:, None] & (self.tube[k] > tol.TURNED))
-        self._ask(k[i], c)
-        inherits = alike & beside[:, None] & self.known[k] & self.moves[k]
-        i, c = np.nonzero(inherits)
-        back = self.component[self.place[k[i], c], b[i]]
-        i, first = np.unique(i[back], return_index=True)
-        k, b, c = k[i], b[i], c[back][first]
-        alike[i] |= self.component[self.place[k, c]]
-        for array in (self.moves, self.which, self.ended, self.alone):
+        alike_vague = alike & is_vague[:, None]
+        i, c = np.nonzero(alike_vague & (self.tube[k] > tol.TURNED))
+        self._follow(k[i], c)
+        i, c = np.nonzero(alike_vague & self.known[k] & self.on_manifold[k])
+        has_own = self.components[self.component_row[k[i], c], b[i]]
+        i, first = np.unique(i[has_own], return_index=True)
+        k, b, c = k[i], b[i], c[has_own][first]
+        alike[i] |= self.components[self.component_row[k, c]]
+        for array in (self.on_manifold, self.moving_joints, self.ended, self.uncrossed):
             array[k, b] = array[k, c]
 
-    def _on_motion(self, k: Int, b: Int, away: Array, group: Bool) -> Bool:
+
+class _Groups(_Components):
+    """Which candidates are one: a candidate of each target at a time leads those that are one with it."""
+
+    def _group_plain(self) -> None:
+        """Group what needs no comparison one by one: regular candidates with none close by, isolated roots and
+        boundaries that are alone on their components or two, known self-motions where nothing else may be on them.
+        """
+        on_simple = self.components[self.component_row] & self.candidates.simple[:, None]  # branches as they stand
+        self.ungrouped &= ~on_simple.any(axis=2)
+        valid, sigma, M = self.ungrouped, self.lost.sigma, self.ungrouped.shape[1]
+        sure: Bool = np.asarray(self.candidates.sure.any(axis=2))
+        unsure, is_other = valid & ~sure, ~np.eye(M, dtype=bool)
+        close = np.zeros((len(valid), M, M), bool)
+        k, i, j = np.nonzero(unsure[:, :, None] & unsure[:, None] & is_other)
+        offset = newton.difference(self.goals.arm, self.candidates.q[k, i], self.candidates.q[k, j])
+        close[k, i, j] = np.abs(offset).max(axis=1, initial=0.0) < tol.CLOSE_BY
+        near_singular = unsure & self.near_singular
+        decided = near_singular & (self.component_row > 0) & ~self.on_manifold
+        may_move = near_singular & ~(decided & self.known & (sigma >= tol.SOLUTION))
+        is_single = np.where(sure, ~may_move.any(axis=1, keepdims=True), ~near_singular & ~close.any(axis=2)) & valid
+        is_open = (near_singular & (self.on_manifold | ~self.pushed)).any(axis=1)
+        decided &= ~np.asarray(is_open | (sure.any(axis=1) & may_move.any(axis=1)))[:, None]
+        rows = np.flatnonzero(decided.any(axis=1))
+        if len(rows):
+            pairable, known = decided[rows], self.known[rows]
+            alike = self.components[self.component_row[rows]] & valid[rows, None] & is_other & pairable[:, :, None]
+            pairable &= (alike == alike.swapaxes(1, 2)).all(axis=2) & ~(close[rows] & ~pairable[:, None]).any(axis=2)
+            pairable &= ~(alike & (known[:, :, None] != known[:, None])).any(axis=2)
+            pairable &= (alike.sum(axis=2) < 2) & ~alike[:, :, 0]
+            pairable &= (~alike | pairable[:, None]).all(axis=2)
+            # the most exact of each, the first of those that need no correction: the same in all arithmetics
+            size = np.maximum(self.candidates.size[rows], np.where(known, tol.CLOSED, 0.0))
+            rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
+            leads = pairable & ~(alike & (rank[:, None] < rank[:, :, None])).any(axis=2)
+            self.chosen[rows] |= leads
+            self.has_boundary[rows] |= (leads & self.is_boundary[rows]).any(axis=1)
+            decided[rows] = pairable
+        self.chosen |= is_single
+        self.ungrouped &= ~(is_single | decided)
+        self.chosen_joints |= is_single[:, :, None] & self.moving_joints & sure[:, :, None]
+        self.has_manifold |= (is_single & sure).any(axis=1)
+        self.free_joints |= self.chosen_joints.any(axis=1)
+
+    def _group(self, k: Int, b: Int) -> None:
+        """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
+        self._push(k, b)
+        if (uncompared := ~self.known[k, b] & (self.component_row[k, b] == 0)).any():
+            self._compare(k[uncompared], b[uncompared])
+        arm, near = self.goals.arm, self.goals.near
+        q, label, size, *_ = self.candidates
+        known = self.known[k, b]
+        size = np.where(known[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # as in `_group_plain`
+        offset = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
+        group: Bool = np.asarray(self.components[self.component_row[k, b]])
+        unlisted = ~(group & self.candidates.simple[k]).any(axis=1)
+        self._inherit_manifolds(k, b, group)
+        moving, joints = self.on_manifold[k, b], self.moving_joints[k, b]
+        group &= self.ungrouped[k]
+        on_motion = self._on_motion(k, b, offset, group | ~self.ungrouped[k]) | (group & (known & moving)[:, None])
+        on_motion[np.arange(len(k)), b] = True
+        group |= on_motion  # what is one with it along a curve beside the self-motion is not on that
+        self.ungrouped[k] &= ~group
+        self.has_boundary[k] |= self.is_boundary[k, b]
+        self.has_manifold[k] |= moving
+        self.free_joints[k] |= joints & moving[:, None]
+        # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
+        motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
+        cost = np.where(moving[:, None], np.where(on_motion, motion, np.inf), np.where(group, size, np.inf))
+        pick = cost.argmin(axis=1)
+        own = np.flatnonzero(label[k, b] == OWN_LABEL)
+        pick[own] = b[own]
+        self.chosen[k, pick] = unlisted
+        self.chosen_joints[k, pick] = joints & moving[:, None]
+        for array in (self.known, self.on_manifold, self.component_row, self.ended, self.uncrossed):
+            array[k, pick] = array[k, b]
+        if len(own):  # named like the candidate of its group that is closest to it
+            motion = np.where(group[own] & (label[k[own]] != OWN_LABEL), motion[own], np.inf)
+            twin_label = label[k[own], motion.argmin(axis=1)]
+            label[k[own], b[own]] = np.where(np.isinf(motion.min(axis=1)), OWN_LABEL, twin_label)
+
+    def _on_motion(self, k: Int, b: Int, offset: Array, group: Bool) -> Bool:
         """Which candidates (m, M) lie on the self-motions of those that lead, besides those `group` with them (m, M).
 
         Whatever differs in its free joints alone; but where the residual grows along it at all, its points are not
         equal, and the exact ones are listed.
         """
         arm, task, target, _ = self.goals
-        q, joints = self.at.q, self.which[k, b]
-        held = np.where(joints[:, None], 0.0, away).max(axis=2)
+        q, joints = self.candidates.q, self.moving_joints[k, b]
+        held_offset = np.where(joints[:, None], 0.0, offset).max(axis=2)
+        moving = self.on_manifold[k, b] & ~self.ended[k, b]  # all that is on other components is one with them
         # two postures of one self-motion may each be off by as much as a double root
-        moving = self.moves[k, b] & ~self.ended[k, b]  # all that is on other components is one with them
-        mine: Bool = moving[:, None] & (held < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION) & self.open[k]
-        far = mine & ~group & (joints.sum(axis=1) > 2)[:, None]
-        rows = np.flatnonzero(far.any(axis=1))
+        shared: Bool = moving[:, None] & (held_offset < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION)
+        shared &= self.ungrouped[k]
+        unsure = shared & ~group & (joints.sum(axis=1) > 2)[:, None]
+        rows = np.flatnonzero(unsure.any(axis=1))
         if len(rows):
             leaders, goal = q[k[rows], b[rows]], target[k[rows]]
-            mine[rows] &= curves.share_circuit(arm, task, leaders, joints[rows], q[k[rows]], far[rows], goal)
-            i, c = np.nonzero(far & mine & (self.resting[k] & joints[:, None]).any(axis=2))  # another curve crosses
+            shared[rows] &= curves.share_circuit(arm, task, leaders, joints[rows], q[k[rows]], unsure[rows], goal)
+            # another curve crosses
+            i, c = np.nonzero(unsure & shared & (self.resting[k] & joints[:, None]).any(axis=2))
             self._push(k[i], c)
-            rests = self.resting[k[i], c] & ~self.which[k[i], c]
-            mine[i, c] &= ~(self.moves[k[i], c] & (joints[i] & rests).any(axis=1))
-        return np.asarray(mine)
+            rests = self.resting[k[i], c] & ~self.moving_joints[k[i], c]
+            shared[i, c] &= ~(self.on_manifold[k[i], c] & (joints[i] & rests).any(axis=1))
+        return np.asarray(shared)
+
+    def _drop_repeated(self, rows: Int) -> None:
+        """Drop what the listed self-motions of targets rows have on them besides their own posture."""
+        goals, q, ended = self.goals.of(rows), self.candidates.q[rows], self.ended[rows]
+        chosen, curve = self.chosen[rows], self.chosen_joints[rows]
+        self_motions.drop_contained(goals, q, self.lost.sigma[rows], self.resting[rows], chosen, curve)
+        # where two directions are lost several manifolds may have a posture
+        linked = (self.known & self.on_manifold)[rows, :, None] & (~ended & (self.lost.nullity[rows] < 2))[:, None]
+        linked &= self.components[self.component_row[rows]]
+        self_motions.drop_twins(goals, q, chosen, curve, ended, linked, self.tube[rows])
+        self.chosen[rows] = chosen
 
     def settle(self, missed: Bool, beyond: Bool) -> Examined:
-        """All candidates grouped; missed, beyond: (K,) of which targets a loose one came to nothing, and of which all
-        that are near lie beyond a fold."""
-        small = self.valid.shape[1] <= FEW_CANDIDATES
-        # candidates that lose several directions are asked once they lead; among many, those that lose one, too
-        asking = ~self.asked & (self.lost.nullity < 2)
-        if asking.any() and (small or asking.sum() <= AT_ONCE):
-            self._ask(*np.nonzero(asking))
-        if small:
-            asking = self.open & self.asked & ~self.pushed  # eight of one target in a row take five times as long
-            if 0 < asking.sum() <= AT_ONCE:
-                self._push(*np.nonzero(asking))
-            asking = self.open & self.weak & self.pushed & ~self.known & ~self.moves
-            if asking.any():
-                self._compare(*np.nonzero(asking))
-            self._plain()
-        while self.open.any():
-            k = np.flatnonzero(self.open.any(axis=1))
-            self._lead(k, np.where(self.open[k], self.rank[k], np.inf).argmin(axis=1))
-        arm, task, target, _ = self.goals
-        q, sigma = self.at.q, self.lost.sigma
-        chosen, every = self.chosen, np.arange(len(self.open))[:, None]
+        """Tell components, group candidates that are one, drop what self-motions contain; missed, beyond: (K,) of which
+        targets a loose candidate came to nothing, and of which all that are near lie beyond a fold."""
+        is_few = self.valid.shape[1] <= FEW_CANDIDATES
+        # candidates that lose several directions are followed once they lead; among many, those that lose one, too
+        unfollowed = ~self.followed & (self.lost.nullity < 2)
+        if unfollowed.any() and (is_few or unfollowed.sum() <= AT_ONCE):
+            self._follow(*np.nonzero(unfollowed))
+        if is_few:
+            # eight candidates of one target one by one take five times as long
+            unpushed = self.ungrouped & self.followed & ~self.pushed
+            if 0 < unpushed.sum() <= AT_ONCE:
+                self._push(*np.nonzero(unpushed))
+            resting = self.ungrouped & self.near_singular & self.pushed & ~self.known & ~self.on_manifold
+            if resting.any():
+                self._compare(*np.nonzero(resting))
+            self._group_plain()
+        while self.ungrouped.any():
+            k = np.flatnonzero(self.ungrouped.any(axis=1))
+            self._group(k, np.where(self.ungrouped[k], self.rank[k], np.inf).argmin(axis=1))
+        moving = np.asarray(self.chosen_joints.any(axis=2))
         # a root of high order may also lie beside a self-motion
-        moving = np.asarray(self.curve.any(axis=2))
-        beside = (chosen & (sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
-        rows = np.flatnonzero((self.curve & ~self.at.sure).any(axis=(1, 2)) | beside)
+        has_root_beside = (self.chosen & (self.lost.sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
+        rows = np.flatnonzero((self.chosen_joints & ~self.candidates.sure).any(axis=(1, 2)) | has_root_beside)
         if len(rows):
-            goals, postures = self.goals.of(rows), q[rows]
-            stay, curve = chosen[rows], self.curve[rows]
-            self_motions.drop_contained(goals, postures, sigma[rows], self.resting[rows], stay, curve)
-            # where two directions are lost several manifolds may have a posture
-            linked = (self.known & self.moves)[rows, :, None] & (~self.ended & (self.lost.nullity < 2))[rows, None]
-            linked &= self.component[self.place[rows]]
-            self_motions.drop_twins(goals, postures, stay, curve, self.ended[rows], linked, self.tube[rows])
-            chosen[rows] = stay
+            self._drop_repeated(rows)
+        (arm, task, target, _), q, chosen = self.goals, self.candidates.q, self.chosen
         order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
+        every = np.arange(len(q))[:, None]
         present = chosen[every, order]
         status = np.where(present.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
-        status[self.double] = Status.BOUNDARY
-        status[self.singular] = Status.SINGULAR
-        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & self.curve.any(axis=2))
+        status[self.has_boundary] = Status.BOUNDARY
+        status[self.has_manifold] = Status.SINGULAR
+        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & moving)
         if len(k):
             lost = self.lost.V[k, b], self.lost.nullity[k, b]
             surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])[0]]] = True
         listed = np.where(present[:, :, None], q[every, order], np.nan)
-        label = np.where(present, self.at.label[every, order], OWN_LABEL)
-        moved = np.asarray((self.curve & ~self.alone[:, :, None]).any(axis=1))
-        return Examined(listed, present, label, status, self.free, missed, surface, moved, beyond)
+        label = np.where(present, self.candidates.label[every, order], OWN_LABEL)
+        moved = np.asarray((self.chosen_joints & ~self.uncrossed[:, :, None]).any(axis=1))
+        return Examined(listed, present, label, status, self.free_joints, missed, surface, moved, beyond)
 
 
-def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
-    """Candidates moved onto their targets, those that miss by less than `most`, and grouped."""
+def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
+    """Candidates moved onto their targets, those that miss by less than `seed_limit`, and grouped."""
     arm, task, target, near = goals
     K, _, n = seeds.q.shape
     present, every = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
@@ -341,22 +359,22 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
     flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
     size, rows = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
     size[rows] = newton.misses(arm, task, flat[rows], target[goal[rows]])
-    beyond, first = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
-    free = np.flatnonzero(~(first | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
-    if len(free):
-        rows = free[size[free] < most]
-        far = rows[size[rows] > tol.SOLUTION]
-        beyond[far] = high_order_roots.beyond_folds(arm, task, flat[far], target[goal[far]])
-        rows = rows[~beyond[rows]]
+    out_of_reach, is_near = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
+    inexact = np.flatnonzero(~(is_near | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
+    if len(inexact):
+        rows = inexact[size[inexact] < seed_limit]
+        unsolved = rows[size[rows] > tol.SOLUTION]
+        out_of_reach[unsolved] = high_order_roots.beyond_folds(arm, task, flat[unsolved], target[goal[unsolved]])
+        rows = rows[~out_of_reach[rows]]
         # towards a root of third order each step goes a third of the way
         flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)
-    q, size = flat.reshape(K, -1, n), size.reshape(K, -1)
+    q, size, is_beyond = flat.reshape(K, -1, n), size.reshape(K, -1), out_of_reach.reshape(K, -1)
     # `near` is a candidate as it is, where it solves the target; where it stands for a self-motion already it is none
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
     q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
     missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~present).any(axis=1)
-    far = beyond.reshape(K, -1)
-    all_beyond = far.any(axis=1) & (far | (size > most) | np.isnan(q[..., 0]))[:, 1:].all(axis=1)
+    is_useless = is_beyond | (size > seed_limit) | np.isnan(q[..., 0])
+    beyond = is_beyond.any(axis=1) & is_useless[:, 1:].all(axis=1)
     rests: Bool = np.zeros(size.shape, bool)
     lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
@@ -365,4 +383,4 @@ def _settle(goals: Goals, seeds: Seeds, most: float) -> Examined:
             sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     candidates = _Candidates(q, label, size, sure, simple)
-    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(all_beyond))
+    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(beyond))

@@ -27,19 +27,16 @@ STRAIGHT = 0.8  # cosine, at least, between the directions of two steps
 
 
 class Step(NamedTuple):
-    """A step of some curves: rows (A,) which, before (A, n) where from, chord (A, n) its way in scaled units.
+    """A step of some curves."""
 
-    unsure: (A,) nobody knows where the curve goes on: another crosses it, it is too long, or steps become too short.
-    """
-
-    rows: Int
-    before: Array
-    chord: Array
-    unsure: Bool
+    rows: Int  # (A,) which curves
+    start: Array  # (A, n)
+    chord: Array  # (A, n) its way [rad, reaches]
+    unsure: Bool  # (A,) whether another curve crosses, or this is too long, or steps become too short to go on
 
     def passes(self, arm: Arm, posture: Array, place: Int) -> Bool:
         """Which postures (P, n) the place-th of these steps pass: (P,)."""
-        way, chord = newton.difference(arm, posture, self.before[place]), self.chord[place]
+        way, chord = newton.difference(arm, posture, self.start[place]), self.chord[place]
         size = (chord * chord).sum(axis=1)
         part = np.clip((way * chord).sum(axis=1) / np.maximum(size, tol.TINY), 0.0, 1.0)
         return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))

@@ -114,7 +114,7 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         step = walk.step()
         count = max(int(np.ceil(np.abs(step.chord).max() / FINE_STEP)), 1)
         share = (np.arange(count) / count)[:, None, None]
-        between = (step.before + share * step.chord * unit).reshape(-1, arm.n)
+        between = (step.start + share * step.chord * unit).reshape(-1, arm.n)
         goal = np.repeat(target[None], len(between), axis=0)
         landed, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
         good = size <= tol.SOLUTION

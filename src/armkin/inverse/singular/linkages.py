@@ -23,29 +23,21 @@ PLACES = np.arange(1.0, 5.0)[:, None]  # places [rad] along a line; zero is the 
 
 
 class Linkages(NamedTuple):
-    """What is known of K targets.
+    """What is known of K targets."""
 
-    known: (K,) whether all self-motions of loose candidates are; lacking: (K,) more candidates may tell. q: (K, M, n)
-    a posture of each self-motion, else nan; joints: (K, M, n) those that they move.
-    """
-
-    known: Bool
-    lacking: Bool
-    q: Array
-    joints: Bool
+    known: Bool  # (K,) whether all self-motions of loose candidates are
+    lacking: Bool  # (K,) whether more candidates may tell
+    q: Array  # (K, M, n) a posture of each self-motion, else nan
+    joints: Bool  # (K, M, n) those that they move
 
 
 class _Motions(NamedTuple):
-    """Self-motions that columns of candidates (K, B) lie on.
+    """Self-motions that columns of candidates (K, B) lie on."""
 
-    line: (K, B) two joints about one line; else four bars. d: (K, B, n) how the joints of a line move, of four bars 1
-    where they do. base: (K, B, n) a posture. joint: (K, B) whose sine tells two circuits of four bars apart, or -1.
-    """
-
-    line: Bool
-    d: Array
-    base: Array
-    joint: Int
+    line: Bool  # (K, B) whether two joints are about one line; else four bars
+    d: Array  # (K, B, n) how the joints of a line move, of four bars 1 where they do
+    base: Array  # (K, B, n) a posture
+    joint: Int  # (K, B) joint whose sine tells two circuits of four bars apart, or -1
 
 
 def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
