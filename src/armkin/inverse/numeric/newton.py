@@ -63,7 +63,7 @@ def correct(
     below which such steps count.
     """
     unit = radian_or_reach(arm)
-    q, best, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
+    q, best_q, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
     idle = np.zeros(len(q), int)
     active = np.arange(len(q))
     for k in range(steps + 1):
@@ -73,45 +73,45 @@ def correct(
             r = residuals(arm, task, q[active], target[active])
         size = np.sqrt((r * r).sum(axis=1))
         size[np.isnan(size)] = np.inf
-        before = best_size[active]
-        better = size < before
-        best[active[better]], best_size[active[better]] = q[active[better]], size[better]
+        last_size = best_size[active]
+        is_better = size < last_size
+        best_q[active[is_better]], best_size[active[is_better]] = q[active[is_better]], size[is_better]
         # a start is done when what it misses is rounding alone
-        least_gain = np.isfinite(size) & (size > tol.ROUNDING) & ((size > tol.CONVERGING) | (size < 0.5 * before))
-        idle[active] = np.where((size < 0.9 * before) | (size > stalled), 0, idle[active] + 1)
-        going = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)
-        active, r, size = active[going], r[going], size[going]
+        least_gain = np.isfinite(size) & (size > tol.ROUNDING) & ((size > tol.CONVERGING) | (size < 0.5 * last_size))
+        idle[active] = np.where((size < 0.9 * last_size) | (size > stalled), 0, idle[active] + 1)
+        is_active = least_gain & (idle[active] < patience) if k else np.isfinite(size) & (size > 0)
+        active, r, size = active[is_active], r[is_active], size[is_active]
         if k == steps or not len(active):
             break
-        step = _least_step(J[going], r, np.maximum(least, 0.1 * size))
+        step = _least_step(J[is_active], r, np.maximum(least, 0.1 * size))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         q[active] += step * unit
-    return best, best_size
+    return best_q, best_size
 
 
-def many_starts(arm: Arm, task: Task, target: Array, lost: Bool) -> Array:
+def many_starts(arm: Arm, task: Task, target: Array, selected: Bool) -> Array:
     """What Newton's method leads to from the same random postures for each target that may lack branches.
 
-    target: (N, m) or (N, 4, 4); lost: (N,), some. Returns (N, STARTS, n) postures that miss their target by less than
+    target: (N, m) or (N, 4, 4); selected: (N,), some. Returns (N, STARTS, n) postures that miss a target by less than
     `SEED`, nan elsewhere: a search, no proof. Of roots that Newton's method only approaches, the nearest round posture,
     if that is better.
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
-    row, index = np.nonzero(np.repeat(lost[:, None], STARTS, axis=1))
+    row, index = np.nonzero(np.repeat(selected[:, None], STARTS, axis=1))
     postures = np.full((len(target), STARTS, arm.n), np.nan)
     q, size = correct(arm, task, start[index], target[row], steps=STEPS, patience=PATIENCE)
-    slow = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
-    if len(slow):
-        even = np.where(arm.prismatic, q[slow], ROUND * np.rint(q[slow] / ROUND))
-        better = misses(arm, task, even, target[row[slow]]) < size[slow]
-        q[slow[better]] = even[better]
+    multiple = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
+    if len(multiple):
+        rounded = np.where(arm.prismatic, q[multiple], ROUND * np.rint(q[multiple] / ROUND))
+        is_better = misses(arm, task, rounded, target[row[multiple]]) < size[multiple]
+        q[multiple[is_better]] = rounded[is_better]
     postures[row, index] = np.where((size < tol.SEED)[:, None], q, np.nan)
     return postures
 
 
-def _least_step(J: Array, r: Array, least: Array) -> Array:
-    """Steps (M, n) of least norm that leave out singular values below least (M,).
+def _least_step(J: Array, r: Array, cutoff: Array) -> Array:
+    """Steps (M, n) of least norm that leave out singular values below cutoff (M,).
 
     One below the residual's own size would throw the step out of the linear range. Where an inverse (M, n, n) tells
     that there is none, by its Frobenius norm, it gives the step at an eighth of the cost.
@@ -120,12 +120,12 @@ def _least_step(J: Array, r: Array, least: Array) -> Array:
     if J.shape[1] == J.shape[2] > 2:
         inverse = nudged(np.linalg.inv, J)
         with np.errstate(over="ignore"):
-            weak = ~(least * np.sqrt((inverse * inverse).sum(axis=(1, 2))) < 1.0)
+            weak = ~(cutoff * np.sqrt((inverse * inverse).sum(axis=(1, 2))) < 1.0)
         step[~weak] = (inverse[~weak] @ r[~weak, :, None])[:, :, 0]
     rows = np.flatnonzero(weak)
     if len(rows):
         U, S, Vt = np.linalg.svd(J[rows], full_matrices=False)
-        gain = np.where(least[rows, None] < S, 1.0 / np.maximum(S, tol.TINY), 0.0)
+        gain = np.where(cutoff[rows, None] < S, 1.0 / np.maximum(S, tol.TINY), 0.0)
         step[rows] = (Vt * (gain * (U * r[rows, :, None]).sum(axis=1))[:, :, None]).sum(axis=1)
     return step
 
@@ -192,12 +192,12 @@ class Lost(NamedTuple):
     place: Int  # (K, M) row of `weak`, -1 for the others
 
 
-def lost_directions(arm: Arm, task: Task, q: Array, chosen: Bool, target: Array) -> Lost:
-    """What the candidates q (K, M, n) lose that are chosen (K, M), which solve their targets; others nothing."""
+def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Array) -> Lost:
+    """What the candidates q (K, M, n) lose that are selected (K, M), which solve their targets; others nothing."""
     K, M, n = q.shape
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
     place, none = np.full((K, M), -1), np.zeros((0, 0))
-    k, b = np.nonzero(chosen)
+    k, b = np.nonzero(selected)
     if not len(k):
         return Lost(sigma, nullity, V, Linear(none, none, none, none), place)
     r, J = scaled(arm, task, q[k, b], target[k])

@@ -90,18 +90,18 @@ def _circles(srs: ArmAngle, target: Array) -> _Circles:
     L, u, p = srs.arm.link, srs.upper, srs.fore
     hand = inverse(L[0]) @ target @ inverse(L[7])
     d = hand[:, :3, :3] @ srs.wrist + hand[:, :3, 3] - srs.shoulder
-    far = np.linalg.norm(d, axis=1)
-    # far^2 = |upper + Rz(q4) fore|^2 = still + 2 swing cos(q4 - middle)
+    d_norm = np.linalg.norm(d, axis=1)
+    # |d|^2 = |upper + Rz(q4) fore|^2 = offset + 2 swing cos(q4 - middle)
     a, b = u[0] * p[0] + u[1] * p[1], u[1] * p[0] - u[0] * p[1]
-    still, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
-    cos = np.clip((far * far - still) / (2.0 * swing), -1.0, 1.0)
-    miss = np.abs(far - np.sqrt(np.maximum(still + 2.0 * swing * cos, 0.0)))
-    reached = (miss <= tol.SOLUTION * srs.arm.reach) & (far > tol.NO_SIZE * srs.arm.reach)
-    apart = np.arccos(cos)
-    apart = np.where(apart < tol.SAME, 0.0, np.where(apart > np.pi - tol.SAME, np.pi, apart))
-    single = (apart == 0.0) | (apart == np.pi)  # the two elbows are the same
-    row, half = np.nonzero(np.stack([reached, reached & ~single], axis=1))
-    q4 = np.arctan2(b, a) + np.where(half == 0, apart[row], -apart[row])
+    offset, swing = u @ u + p @ p + 2.0 * u[2] * p[2], float(np.hypot(a, b))
+    cos = np.clip((d_norm * d_norm - offset) / (2.0 * swing), -1.0, 1.0)
+    miss = np.abs(d_norm - np.sqrt(np.maximum(offset + 2.0 * swing * cos, 0.0)))
+    is_reached = (miss <= tol.SOLUTION * srs.arm.reach) & (d_norm > tol.NO_SIZE * srs.arm.reach)
+    angle = np.arccos(cos)
+    angle = np.where(angle < tol.SAME, 0.0, np.where(angle > np.pi - tol.SAME, np.pi, angle))
+    single = (angle == 0.0) | (angle == np.pi)  # the two elbows are the same
+    row, side = np.nonzero(np.stack([is_reached, is_reached & ~single], axis=1))
+    q4 = np.arctan2(b, a) + np.where(side == 0, angle[row], -angle[row])
     elbow = L[3][:3, :3] @ rotation_about(2, q4)
     # columns first, targets last
     f, g = (_frame(v).transpose(2, 1, 0) for v in (d[row], elbow @ p + L[3][:3, :3] @ u))
@@ -110,10 +110,10 @@ def _circles(srs: ArmAngle, target: Array) -> _Circles:
     fore = np.einsum("mjk,eijm->ekim", elbow @ L[4][:3, :3], upper)
     hand = np.einsum("ekim,mil->eklm", fore, hand[row, :3, :3])
     R = np.stack([upper, hand], axis=3)
-    straight = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP).any(axis=0)
-    complete = far > tol.SOLUTION * srs.arm.reach
-    complete[row[straight]] = False
-    return _Circles(R, q4, row, half, complete)
+    stretched = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP).any(axis=0)
+    complete = d_norm > tol.SOLUTION * srs.arm.reach
+    complete[row[stretched]] = False
+    return _Circles(R, q4, row, side, complete)
 
 
 def _angles(srs: ArmAngle, R: Array, psi: Array) -> Array:
@@ -135,9 +135,9 @@ def _joint_values(srs: ArmAngle, t: Array, flip: Array) -> Array:
 
 def _roots(a: Array, b: Array, c: Array) -> Array:
     """The two angles (M, 2) where a cos + b sin = c; where there is none the one that comes closest, twice."""
-    apart = np.arccos(np.clip(c / np.maximum(np.hypot(a, b), tol.TINY), -1.0, 1.0))
+    half_angle = np.arccos(np.clip(c / np.maximum(np.hypot(a, b), tol.TINY), -1.0, 1.0))
     middle = np.arctan2(b, a)
-    return np.stack([middle - apart, middle + apart], axis=1)
+    return np.stack([middle - half_angle, middle + half_angle], axis=1)
 
 
 def _turning_rate(R: Array) -> tuple[Array, Array, Array]:
@@ -149,8 +149,8 @@ def _turning_rate(R: Array) -> tuple[Array, Array, Array]:
 def _special_angles(srs: ArmAngle, R: Array, near: Array) -> Array:
     """Values of psi (M, K), sorted, where a joint may stand on a limit or at near (M, n), or the last one turns back,
     and some between."""
-    turning = _turning_rate(R)
-    angles = [_roots(turning[0], turning[1], -turning[2])]
+    rate = _turning_rate(R)
+    angles = [_roots(rate[0], rate[1], -rate[2])]
     for k, joints in enumerate(JOINTS):
         e = R[:, :, :, k]
         for i, joint in enumerate(joints):
@@ -188,29 +188,29 @@ def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     psi = np.empty((M, 2 * K + 1))
     psi[:, ::2], psi[:, 1::2] = ends, 0.5 * (ends[:, 1:] + ends[:, :-1])
     t = _angles(srs, circles.R, psi[:, :-1])
-    elbow, reached = nearest_of_joint(arm, 3, circles.q4, near[:, 3])
+    elbow, elbow_fits = nearest_of_joint(arm, 3, circles.q4, near[:, 3])
     cost = np.broadcast_to(np.abs(elbow - near[:, 3])[:, None, None, None], (M, 2, 2, 2 * K)).copy()
-    legal = np.broadcast_to(np.broadcast_to(reached, M)[:, None, None, None], cost.shape).copy()
-    for half in range(2):
-        q = _joint_values(srs, t, np.array(half == 1))
+    legal = np.broadcast_to(np.broadcast_to(elbow_fits, M)[:, None, None, None], cost.shape).copy()
+    for side in range(2):
+        q = _joint_values(srs, t, np.array(side == 1))
         for k, joints in enumerate(JOINTS):
-            halves = (slice(None), half) if k == 0 else (slice(None), slice(None), half)
+            halves = (slice(None), side) if k == 0 else (slice(None), slice(None), side)
             for i, joint in enumerate(joints):
                 reference = near[:, joint, None]
-                value, within = nearest_of_joint(arm, joint, q[i, k], reference)
-                moved, fits = np.abs(value - reference), np.broadcast_to(within, (M, 2 * K))
-                cost[halves] += moved[:, None]
+                value, in_limits = nearest_of_joint(arm, joint, q[i, k], reference)
+                change, fits = np.abs(value - reference), np.broadcast_to(in_limits, (M, 2 * K))
+                cost[halves] += change[:, None]
                 legal[halves] &= fits[:, None]
     a, b, c = (x[:, None] for x in _turning_rate(circles.R))
     middle = psi[:, 1::2]
-    up = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
+    rises = (a * np.cos(middle) + b * np.sin(middle) + c >= 0.0) | (np.hypot(a, b) + np.abs(c) < tol.NO_SIZE)
     # a piece shorter than rounding has the sense of the piece before it
-    wide = np.diff(ends, axis=1) > tol.EXACT
-    before = np.maximum.accumulate(np.where(np.tile(wide, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
-    up = np.take_along_axis(up, before, axis=1)
-    between = np.take_along_axis(legal[..., 1::2], before[:, None, None], axis=3)
-    point = legal[..., ::2] & wide[:, None, None] & ~between & ~np.roll(between, 1, axis=3)
-    return _Samples(psi, cost, legal, up, between, point, t[2, 1] - srs.offset[2, 1])
+    has_length = np.diff(ends, axis=1) > tol.EXACT
+    source = np.maximum.accumulate(np.where(np.tile(has_length, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
+    rises = np.take_along_axis(rises, source, axis=1)
+    legal_cell = np.take_along_axis(legal[..., 1::2], source[:, None, None], axis=3)
+    point = legal[..., ::2] & has_length[:, None, None] & ~legal_cell & ~np.roll(legal_cell, 1, axis=3)
+    return _Samples(psi, cost, legal, rises, legal_cell, point, t[2, 1] - srs.offset[2, 1])
 
 
 class Turning(NamedTuple):
@@ -253,22 +253,22 @@ def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     M, K = s.up.shape
     turns = s.up != np.roll(s.up, 1, axis=1)  # the last joint turns back here
     of_curves = np.broadcast_to(turns[:, None, None], s.between.shape).reshape(-1, K)
-    between, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
-    spans = [runs(between, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
-    circle_half, begin, count = runs(np.ones_like(between), of_curves)
-    empty = holding_none(between | point, circle_half, begin, count)
+    legal_cell, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
+    spans = [runs(legal_cell, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
+    circle_half, begin, count = runs(np.ones_like(legal_cell), of_curves)
+    empty = holding_none(legal_cell | point, circle_half, begin, count)
     spans.append((circle_half[empty], begin[empty], count[empty]))
     legal = np.repeat([True, True, False], [len(curve) for curve, *_ in spans])
     curve, first, length = (np.concatenate(column) for column in zip(*spans, strict=True))
     circle, wrist = curve // 4, curve % 2
     # the best sample, and how far the last joint turns: between two samples it is monotone
     costs = np.concatenate([s.cost, np.where(s.legal, s.cost, np.inf)]).reshape(-1, 2 * K)
-    best = best_samples(costs, curve + len(between) * legal, 2 * first, 2 * length + 1)
+    best_sample = best_samples(costs, curve + len(legal_cell) * legal, 2 * first, 2 * length + 1)
     sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)
     step = np.remainder(sign * (np.roll(s.turned, -1, axis=1) - s.turned), TURN)
     step[step > TURN - tol.SAME * 10] = 0.0  # rounding, backwards
-    way = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
-    total = way[circle, 2 * (first + length)] - way[circle, 2 * first]
+    travel = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
+    total = travel[circle, 2 * (first + length)] - travel[circle, 2 * first]
     total[length == K] = np.where(total[length == K] > np.pi, TURN, 0.0)
     start = s.turned[circle, 2 * first] + np.pi * wrist
     end = start + np.where(s.up[circle, first], total, -total)
@@ -276,7 +276,7 @@ def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     def psi(sample: Int) -> Array:
         return np.asarray(s.psi[circle, sample % (2 * K)] + TURN * (sample // (2 * K)))
 
-    best_at = 2 * first + best
+    best_at = 2 * first + best_sample
     return Pieces(
         circles.row[circle], circles.half[circle] * 4 + curve % 4, legal,
         np.minimum(start, end), np.maximum(start, end),

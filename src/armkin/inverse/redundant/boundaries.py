@@ -63,7 +63,7 @@ class Boundaries(NamedTuple):
     fore: Array  # (3,) the wrist, seen behind joint 4
     wrist: Array  # (3,) seen behind joint 6
     in_line: float | None  # cosine of joint 4, from its middle, where axes 3 and 5 and the line between both are one
-    still: float  # squared distance of the wrist: still - 2 swing cos(q4 - middle)
+    offset: float  # squared distance of the wrist: offset - 2 swing cos(q4 - middle)
     swing: float
     middle: float
 
@@ -80,27 +80,27 @@ def boundaries(arm: Arm) -> Boundaries | None:
     on5 = perpendicular_foot(L[5])
     wrist = (inverse(L[5]) @ [*on5, 1.0])[:3]
     upper, fore = (inverse(L[3]) @ [*shoulder[1], 1.0])[:3], (L[4] @ [*on5, 1.0])[:3]
-    along, across = upper[:2] @ fore[:2], upper[1] * fore[0] - upper[0] * fore[1]
-    swing = float(np.hypot(along, across))
+    cos_part, sin_part = upper[:2] @ fore[:2], upper[1] * fore[0] - upper[0] * fore[1]
+    swing = float(np.hypot(cos_part, sin_part))
     if np.hypot(*wrist[:2]) > tol.EXACT or swing <= tol.NO_LENGTH:
         return None
-    still = float(upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2])
-    middle = float(np.arctan2(across, along))
-    return Boundaries(arm, L, shoulder[0], upper, fore, wrist, _in_line(L, upper, fore, middle), still, swing, middle)
+    offset = float(upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2])
+    middle = float(np.arctan2(sin_part, cos_part))
+    return Boundaries(arm, L, shoulder[0], upper, fore, wrist, _in_line(L, upper, fore, middle), offset, swing, middle)
 
 
 def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None:
     """The cosine of joint 4 at which axes 3 and 5 are one line, or None."""
     axis3, axis5 = L[3][:3, :3].T @ Z, L[4][:3, 2]
-    along, across = axis3[:2] @ axis5[:2], axis3[1] * axis5[0] - axis3[0] * axis5[1]
-    for q4 in (np.arctan2(across, along), np.arctan2(-across, -along)):
-        back, line = rotation_about(2, -q4), upper - rotation_about(2, q4) @ fore
-        if max(np.abs(np.cross(back @ v, axis5)).max() for v in (axis3, line)) <= tol.EXACT:
+    cos_part, sin_part = axis3[:2] @ axis5[:2], axis3[1] * axis5[0] - axis3[0] * axis5[1]
+    for q4 in (np.arctan2(sin_part, cos_part), np.arctan2(-sin_part, -cos_part)):
+        turn, line = rotation_about(2, -q4), upper - rotation_about(2, q4) @ fore
+        if max(np.abs(np.cross(turn @ v, axis5)).max() for v in (axis3, line)) <= tol.EXACT:
             return float(np.cos(q4 - middle))
     return None
 
 
-class _Held:
+class _WristFrame:
     """The arm with joint 7 held at t (M,), at targets (S, 4, 4): what is about the wrist, seen behind joint 6."""
 
     def __init__(self, bounds: Boundaries, target: Array, t: Complex) -> None:
@@ -108,12 +108,12 @@ class _Held:
         self.target = shrink_translations(target, bounds.arm.reach)
         base = bounds.link[0] @ [*bounds.shoulder, 1.0]
         shoulder = (bounds.link[7] @ inverse(self.target) @ base)[:, :3]
-        self.to = self.turned(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # the shoulder
-        self.far = (self.to * self.to).sum(axis=0)  # squared
-        self.cos = (bounds.still - self.far) / (2.0 * bounds.swing)  # cosine of joint 4, from its middle
+        self.u = self.seen_behind6(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # to the shoulder
+        self.u_square = (self.u * self.u).sum(axis=0)
+        self.cos = (bounds.offset - self.u_square) / (2.0 * bounds.swing)  # cosine of joint 4, from its middle
         self.square = 1.0 - self.cos * self.cos  # square of its sine, s
 
-    def turned(self, v: Array) -> Complex:
+    def seen_behind6(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""
         c, s = np.cos(self.t), np.sin(self.t)
         x, y, z = v.T[:, :, None]
@@ -123,34 +123,42 @@ class _Held:
         """A vector v (3,) seen before joint 4, less one seen behind it, as seen before joint 5."""
         c, s = np.cos(self.bounds.middle), np.sin(self.bounds.middle)
         # Rz(-q4) v = (vx, vy) cos(q4) + (vy, -vx) sin(q4), and q4 is the middle and an angle
-        ahead = np.array([[v[0], v[1], 0.0], [v[1], -v[0], 0.0]])
+        v_cos, v_sin = np.array([[v[0], v[1], 0.0], [v[1], -v[0], 0.0]])
         R = self.bounds.link[4][:3, :3].T
-        parts = R @ (Z * v[2] - origin), R @ (c * ahead[0] + s * ahead[1]), R @ (c * ahead[1] - s * ahead[0])
+        parts = R @ (Z * v[2] - origin), R @ (c * v_cos + s * v_sin), R @ (c * v_sin - s * v_cos)
         return [_Rooted(a + b * self.cos, d + 0 * self.cos, self.square) for a, b, d in zip(*parts, strict=True)]
 
 
-def _shoulder(held: _Held, e0: Array, e3: Array, cosine: float) -> Complex:
-    """Where e0 (3,), seen before joint 1, and e3 (3,), seen behind joint 3, have an angle's cosine: values (S, M)."""
-    bounds, (px, py, h), far = held.bounds, held.to, held.far
-    d = bounds.link[5][:3, :3].T @ Z  # axis 5, seen behind joint 5
-    to = held.before5(bounds.upper, bounds.fore)  # the shoulder from the wrist
-    w = held.before5(bounds.link[3][:3, :3].T @ e3, np.zeros(3))
-    k = to[2]
-    dot = to[0] * w[0] + to[1] * w[1] + to[2] * w[2]
-    # w = (a z5 + b to + c z5 x to) / across, and axis 5 is (d2 z6 + (k1 p + g q) / round), q at right angles to p
-    a, b, c = w[2] * far - k * dot, dot - k * w[2], w[1] * to[0] - w[0] * to[1]
-    across, round6 = k * k * -1.0 + far, px * px + py * py
+def _shoulder(frame: _WristFrame, e0: Array, e3: Array, cosine: float) -> Complex:
+    """Where e0 (3,), seen before joint 1, and e3 (3,), seen behind joint 3, have an angle's cosine: values (S, M).
+
+    With u from the wrist to the shoulder, p = u - h z6, q = z6 x p, d = z5 seen behind joint 5, and k1 = z5.u - h d2:
+
+        e3 is w = (a z5 + b u + c z5 x u) / |z5 x u|^2,  z5 = d2 z6 + (k1 p + g q) / |p|^2,
+        g^2 = (d0^2 + d1^2) |p|^2 - k1^2,  and of n, which is e0, (n.w - cosine) |z5 x u|^2 |p|^2 = A + g B.
+
+    The product over both signs of g is A^2 - g^2 B^2.
+    """
+    bounds, (px, py, h), u_square = frame.bounds, frame.u, frame.u_square
+    d = bounds.link[5][:3, :3].T @ Z
+    # in the frame before joint 5, whose z axis is z5: u, w, and w's coefficients a, b, c
+    u = frame.before5(bounds.upper, bounds.fore)
+    w = frame.before5(bounds.link[3][:3, :3].T @ e3, np.zeros(3))
+    k, u_w = u[2], u[0] * w[0] + u[1] * w[1] + u[2] * w[2]
+    a, b, c = w[2] * u_square - k * u_w, u_w - k * w[2], w[1] * u[0] - w[0] * u[1]
+    cross_square, p_square = k * k * -1.0 + u_square, px * px + py * py
+    # in the frame behind joint 6, whose z axis is z6: n, n.p and n.q
+    nx, ny, nz = frame.seen_behind6(e0 @ (frame.target[:, :3, :3] @ bounds.link[7][:3, :3].T))
+    n_p, n_q = nx * px + ny * py, ny * px - nx * py
     k1 = k - h * d[2]
-    nx, ny, nz = held.turned(e0 @ (held.target[:, :3, :3] @ bounds.link[7][:3, :3].T))
-    p, q = nx * px + ny * py, ny * px - nx * py
-    still = a * (k1 * p + d[2] * nz * round6) + b * ((p + h * nz) * round6)
-    still = still + c * (k1 * (-h * q) + d[2] * q * round6) - across * (cosine * round6)
-    moving = a * q + c * (h * p - nz * round6)
-    g2 = k1 * k1 * -1.0 + (d[0] * d[0] + d[1] * d[1]) * round6
-    product = still * still - g2 * (moving * moving)
-    value = product.product() / (round6 * round6 * across.product())
+    A = a * (k1 * n_p + d[2] * nz * p_square) + b * ((n_p + h * nz) * p_square)
+    A = A + c * (k1 * (-h * n_q) + d[2] * n_q * p_square) - cross_square * (cosine * p_square)
+    B = a * n_q + c * (h * n_p - nz * p_square)
+    g_square = k1 * k1 * -1.0 + (d[0] * d[0] + d[1] * d[1]) * p_square
+    product = A * A - g_square * (B * B)
+    value = product.product() / (p_square * p_square * cross_square.product())  # over the signs of s
     if bounds.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
-        value = value / (held.cos - bounds.in_line) ** 2
+        value = value / (frame.cos - bounds.in_line) ** 2
     return np.asarray(value)
 
 
@@ -162,27 +170,26 @@ def _limits_of_joint(arm: Arm, j: int) -> list[float]:
 
 def _equations(bounds: Boundaries, target: Array) -> Complex:
     """Values of all polynomials at samples (F, S, M)."""
-    held = _Held(bounds, target, sampled_at(DEGREE))
+    frame = _WristFrame(bounds, target, sampled_at(DEGREE))
     R, limits = bounds.link[:, :3, :3], [_limits_of_joint(bounds.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
-    to, h = held.before5(bounds.upper, bounds.fore), held.to[2]
-    values = [_shoulder(held, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
-    values += [_shoulder(held, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
-    values += [_shoulder(held, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    values += [held.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - bounds.middle)) for q in limits[3]))]
+    u, h = frame.before5(bounds.upper, bounds.fore), frame.u[2]
+    values = [_shoulder(frame, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
+    values += [_shoulder(frame, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
+    values += [_shoulder(frame, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
+    values += [frame.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - bounds.middle)) for q in limits[3]))]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
-        values.append((to[0] * x + to[1] * y + to[2] * z - h).product())
+        values.append((u[0] * x + u[1] * y + u[2] * z - h).product())
     for q in limits[5]:  # axis 5 and that line
-        values.append((to[2] - np.tensordot(rotation_about(2, -q) @ axis5, held.to, 1)).product())
-    k1 = to[2] - h * axis5[2]  # g is nothing
-    values.append((k1 * k1 * -1.0 + (axis5[0] ** 2 + axis5[1] ** 2) * (held.to[:2] ** 2).sum(axis=0)).product())
+        values.append((u[2] - np.tensordot(rotation_about(2, -q) @ axis5, frame.u, 1)).product())
+    k1 = u[2] - h * axis5[2]  # g is nothing
+    values.append((k1 * k1 * -1.0 + (axis5[0] ** 2 + axis5[1] ** 2) * (frame.u[:2] ** 2).sum(axis=0)).product())
     return np.stack(values)
 
 
 def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
-    """Where something may change at targets (S, 4, 4): (S, V), sorted, inf where there are fewer; whether these are all
-    (S,)."""
+    """Where something may change at targets (S, 4, 4): (S, V), sorted, inf past the last; whether that is all (S,)."""
     values = _equations(bounds, target)
     F, S, M = values.shape
     zeros = roots(values.reshape(-1, M), DEGREE)
@@ -192,8 +199,8 @@ def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
     order = np.lexsort((angles, row))
     row, angles = row[order], angles[order]
-    apart = np.append(True, (np.diff(row) != 0) | (np.diff(angles) > tol.SAME_END))
-    row, angles = row[apart], angles[apart]
+    distinct = np.append(True, (np.diff(row) != 0) | (np.diff(angles) > tol.SAME_END))
+    row, angles = row[distinct], angles[distinct]
     count = np.bincount(row, minlength=S)
     table = np.full((S, int(count.max(initial=0))), np.inf)
     table[row, numbers_within(count)] = angles
@@ -206,8 +213,8 @@ def on_both_sides(angles: Array) -> Array:
     count = real.sum(axis=1)
     finite = np.where(real, angles, 0.0)
     first, last = finite[:, :1] + 2 * np.pi, finite[np.arange(len(angles)), count - 1] - 2 * np.pi
-    before = finite - np.concatenate([last[:, None], finite[:, :-1]], axis=1)
-    following = np.concatenate([finite[:, 1:], first], axis=1)
-    behind = np.where(np.arange(angles.shape[1]) == count[:, None] - 1, first, following) - finite
-    sides = [finite - np.minimum(before / 3, tol.BESIDE_END), finite + np.minimum(behind / 3, tol.BESIDE_END)]
+    gap_below = finite - np.concatenate([last[:, None], finite[:, :-1]], axis=1)
+    next_angle = np.concatenate([finite[:, 1:], first], axis=1)
+    gap_above = np.where(np.arange(angles.shape[1]) == count[:, None] - 1, first, next_angle) - finite
+    sides = [finite - np.minimum(gap_below / 3, tol.BESIDE_END), finite + np.minimum(gap_above / 3, tol.BESIDE_END)]
     return np.where(np.tile(real, 2), np.remainder(np.hstack(sides) + np.pi, 2 * np.pi) - np.pi, np.inf)

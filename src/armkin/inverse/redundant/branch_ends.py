@@ -31,8 +31,7 @@ class _Ends:
         self.row, self.branch = row, branch
 
     def room_at(self, ends: Int, value: Array) -> Array:
-        """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan where the branch is
-        not there.
+        """How good ends (M,) are at values (M,): positive where they are, linear about the end, nan without the branch.
 
         The way to the limits [rad], or the squared distance of the nearest other branch.
         """
@@ -40,58 +39,58 @@ class _Ends:
         if self.of_limits:
             return margin(self.follower.arm, self.follower.own(row, branch, value))
         q = self.follower.branches_at(row, value)
-        *_, apart = nearest_other(q, branch)
-        return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, apart))
+        *_, gap = nearest_other(q, branch)
+        return np.asarray(np.where(np.isnan(q[np.arange(len(ends)), branch, 0]), np.nan, gap))
 
-    def between(self, good: Array, bad: Array, before: Array, rooms: tuple[Array, Array, Array]) -> Array:
-        """Where each ends (M,): good and bad are the values on its sides, before lies beyond good.
+    def between(self, valid: Array, invalid: Array, previous: Array, rooms: tuple[Array, Array, Array]) -> Array:
+        """Where each ends (M,): valid and invalid are values on its sides, previous lies beyond valid.
 
         By secants: across the end where the branch is there on both sides, else from the side where it is.
         """
-        lo, hi, last = good.copy(), bad.copy(), before.copy()
+        lo, hi, last = valid.copy(), invalid.copy(), previous.copy()
         at_lo, at_hi, at_last = np.maximum(rooms[0], tol.TINY), rooms[1].copy(), rooms[2].copy()
-        value, going = 0.5 * (lo + hi), np.arange(len(lo))
-        over, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
+        value, active = 0.5 * (lo + hi), np.arange(len(lo))
+        overshot, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
         for k in range(HALVINGS):
-            low, high = lo[going], hi[going]
-            a, b, c = at_lo[going], at_hi[going], at_last[going]
+            low, high = lo[active], hi[active]
+            a, b, c = at_lo[active], at_hi[active], at_last[active]
             with np.errstate(invalid="ignore", divide="ignore"):
-                across = low + (high - low) * a / (a - b)
-                along = low + (low - last[going]) * a / (c - a)
-                guess = np.where(b <= 0, across, along)
-                inside = ((guess - low) * (high - guess) > 0) & ~over[going] & (k < SECANTS)
-            step = np.where(inside, np.abs(guess - value[going]), np.abs(high - low))
+                secant = low + (high - low) * a / (a - b)
+                extrapolated = low + (low - last[active]) * a / (c - a)
+                guess = np.where(b <= 0, secant, extrapolated)
+                fits = ((guess - low) * (high - guess) > 0) & ~overshot[active] & (k < SECANTS)
+            step = np.where(fits, np.abs(guess - value[active]), np.abs(high - low))
             # where a secant along the branch has gone past the end, the end is close by
-            guess = np.where(inside, guess, np.where(over[going], high - BACK * (high - low), 0.5 * (low + high)))
-            value[going] = np.where(b == 0, high, np.where(inside | ~over[going], guess, value[going]))
-            left = (step > tol.SAME_END) & (b != 0)
-            going, guess, inside = going[left], guess[left], inside[left]
-            if not len(going):
+            guess = np.where(fits, guess, np.where(overshot[active], high - BACK * (high - low), 0.5 * (low + high)))
+            value[active] = np.where(b == 0, high, np.where(fits | ~overshot[active], guess, value[active]))
+            keep = (step > tol.SAME_END) & (b != 0)
+            active, guess, fits = active[keep], guess[keep], fits[keep]
+            if not len(active):
                 break
-            room = self.room_at(going, guess)
-            left = ~(np.abs(room) < tol.NO_ROOM)
-            going, guess = going[left], guess[left]
-            inside, room = inside[left], room[left]
-            better = room > 0
-            over[going] = inside & np.isnan(room)
+            room = self.room_at(active, guess)
+            keep = ~(np.abs(room) < tol.NO_ROOM)
+            active, guess = active[keep], guess[keep]
+            fits, room = fits[keep], room[keep]
+            is_valid = room > 0
+            overshot[active] = fits & np.isnan(room)
             # the Illinois rule: the value of an end that has stayed twice is halved
-            at_hi[going[better & side[going]]] *= 0.5
-            at_lo[going[~better & ~side[going]]] *= 0.5
-            side[going] = better
-            moved = going[better]
-            last[moved], at_last[moved] = lo[moved], at_lo[moved]
-            lo[moved], at_lo[moved] = guess[better], room[better]
-            moved = going[~better]
-            hi[moved], at_hi[moved] = guess[~better], room[~better]
+            at_hi[active[is_valid & side[active]]] *= 0.5
+            at_lo[active[~is_valid & ~side[active]]] *= 0.5
+            side[active] = is_valid
+            rows = active[is_valid]
+            last[rows], at_last[rows] = lo[rows], at_lo[rows]
+            lo[rows], at_lo[rows] = guess[is_valid], room[is_valid]
+            rows = active[~is_valid]
+            hi[rows], at_hi[rows] = guess[~is_valid], room[~is_valid]
         return value
 
 
 def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:
     """Where limits are crossed (M,), known but for the rounding of their polynomials: a secant step in the joints."""
-    h, own = tol.BESIDE_CROSSING, follower.own
-    near, far = (margin(follower.arm, own(changes.row, changes.branch, place)) for place in (value, value + h))
+    h, joints = tol.BESIDE_CROSSING, follower.own
+    m0, m1 = (margin(follower.arm, joints(changes.row, changes.branch, place)) for place in (value, value + h))
     with np.errstate(invalid="ignore", divide="ignore"):
-        step = near * h / (near - far)
+        step = m0 * h / (m0 - m1)
         return np.asarray(np.where(np.abs(step) < h, value + step, value))
 
 
@@ -108,19 +107,19 @@ def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Change
         return sign * rows.room_at(every, value)
 
     begin, end = value_at(t, row, k), value_at(t, row, k + 1)
-    _, _, peak, least = golden_section(depth, begin, end, PEAK)
-    top = -least
+    _, _, peak, min_depth = golden_section(depth, begin, end, PEAK)
+    top = -min_depth
     hidden = np.flatnonzero(top > 0)
     row, k, branch = row[hidden], k[hidden], branch[hidden]
     sign, peak, top = sign[hidden], peak[hidden], top[hidden]
-    beside = _Ends(follower, np.tile(row, 2), np.tile(branch, 2), True)
+    sides = _Ends(follower, np.tile(row, 2), np.tile(branch, 2), True)
     at_sample = room[hidden].T.ravel()
     outer, inner = np.concatenate([begin[hidden], end[hidden]]), np.tile(peak, 2)
-    inside = np.tile(sign < 0, 2)  # the stretch is the legal one
-    good, bad = np.where(inside, inner, outer), np.where(inside, outer, inner)
+    is_legal = np.tile(sign < 0, 2)  # the stretch is the legal one
+    valid, invalid = np.where(is_legal, inner, outer), np.where(is_legal, outer, inner)
     at_inner = np.tile(-sign * top, 2)
-    rooms = np.where(inside, at_inner, at_sample), np.where(inside, at_sample, at_inner)
-    ends = beside.between(good, bad, good, (*rooms, np.full(len(good), np.nan)))
+    rooms = np.where(is_legal, at_inner, at_sample), np.where(is_legal, at_sample, at_inner)
+    ends = sides.between(valid, invalid, valid, (*rooms, np.full(len(valid), np.nan)))
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
@@ -130,28 +129,28 @@ def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Arra
     Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
     """
     changes, every = gone.at, np.arange(len(gone.twin))
-    good = changes.value(0, t)
+    last = changes.value(0, t)
     number = {key: i for i, key in enumerate(zip(*(column.tolist() for column in changes), strict=True))}
-    whose = zip(changes.row.tolist(), changes.k.tolist(), gone.twin.tolist(), changes.set_before.tolist(), strict=True)
-    twin = np.array([number.get(key, i) for i, key in enumerate(whose)], np.intp)
+    keys = zip(changes.row.tolist(), changes.k.tolist(), gone.twin.tolist(), changes.set_before.tolist(), strict=True)
+    twin = np.array([number.get(key, i) for i, key in enumerate(keys)], np.intp)
     first = np.where((twin < every) & (twin[twin] == every), twin, every)  # which end is asked for each
-    value, room, joined = np.empty(len(every)), np.empty(len(every)), np.zeros(len(every), bool)
+    value, room, met = np.empty(len(every)), np.empty(len(every)), np.zeros(len(every), bool)
     leaders = np.flatnonzero(first == every)
     while len(leaders):
         ends = _Ends(follower, changes.row[leaders], changes.branch[leaders], False)
         rooms = gone.apart[leaders, 0], np.full(len(leaders), np.nan), gone.apart[leaders, 1]
-        value[leaders] = ends.between(good[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
-        rows = np.flatnonzero(~joined & np.isin(first, leaders))
+        value[leaders] = ends.between(last[leaders], changes.value(1, t)[leaders], changes.value(-1, t)[leaders], rooms)
+        rows = np.flatnonzero(~met & np.isin(first, leaders))
         value[rows] = value[first[rows]]
-        back = np.clip(good[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
-        q = follower.branches_at(changes.row[rows], value[rows] + back)
-        away, _, apart = nearest_other(q, changes.branch[rows])
-        mine = q[np.arange(len(rows)), changes.branch[rows]]
-        present = ~np.isnan(mine[:, 0])
-        middle = margin(follower.arm, mine + 0.5 * np.where(apart < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(away))
+        offset = np.clip(last[rows] - value[rows], -tol.BEFORE_MERGING, tol.BEFORE_MERGING)
+        q = follower.branches_at(changes.row[rows], value[rows] + offset)
+        step, _, gaps = nearest_other(q, changes.branch[rows])
+        joints = q[np.arange(len(rows)), changes.branch[rows]]
+        present = ~np.isnan(joints[:, 0])
+        middle = margin(follower.arm, joints + 0.5 * np.where(gaps < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(step))
         room[rows] = np.where(present, middle, gone.room[rows])
-        joined[rows] = (first[rows] == rows) | (present & (apart <= tol.JOINED * gone.apart[rows, 0]))
-        leaders = rows[~joined[rows]]
+        met[rows] = (first[rows] == rows) | (present & (gaps <= tol.JOINED * gone.apart[rows, 0]))
+        leaders = rows[~met[rows]]
         first[leaders] = leaders
     return value, room
 
@@ -165,36 +164,36 @@ class Places(NamedTuple):
     ends: tuple[Array, Array]  # where the branch ends, and where its limit is crossed
 
 
-def places_of(follower: Follower, shown: Summary) -> Places:
+def places_of(follower: Follower, summary: Summary) -> Places:
     """All ends of some targets.
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
-    t, gone, illegal = shown.t, shown.gone.at, shown.crossed.at
-    merged, room = _merging_ends(follower, t, shown.gone)
-    inside, outside = shown.crossed.rooms.T
+    t, vanishing, illegal = summary.t, summary.gone.at, summary.crossed.at
+    merging, room = _merging_ends(follower, t, summary.gone)
+    room0, room1 = summary.crossed.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
-    ending = np.isnan(outside)
+    ending = np.isnan(room1)
     place = np.zeros(len(ending), np.intp)
-    place[ending] = number_of(gone, illegal.row[ending], illegal.k[ending], illegal.branch[ending], t.shape[1])
-    if len(gone.row):
-        outside = np.where(ending, room[place], outside)
-    to_end = ending & (outside >= 0.0)
+    place[ending] = number_of(vanishing, illegal.row[ending], illegal.k[ending], illegal.branch[ending], t.shape[1])
+    if len(vanishing.row):
+        room1 = np.where(ending, room[place], room1)
+    to_end = ending & (room1 >= 0.0)
     legal = np.empty(len(ending))
-    legal[to_end] = merged[place[to_end]]
+    legal[to_end] = merging[place[to_end]]
     crossing, place = rows_of(illegal, ~to_end), place[~to_end]
-    lone = (room >= 0.0) & ~shown.gone.legal
-    short = rows_of(gone, lone)
+    single = (room >= 0.0) & ~summary.gone.legal
+    short = rows_of(vanishing, single)
     row, branch = np.concatenate([crossing.row, short.row]), np.concatenate([crossing.branch, short.branch])
-    far = crossing.value(1, t)
-    if len(gone.row):
-        far = np.where(ending[~to_end], merged[place], far)
-    good, bad = np.concatenate([crossing.value(0, t), merged[lone]]), np.concatenate([far, short.value(0, t)])
-    at_good = np.concatenate([inside[~to_end], room[lone]])
-    rooms = at_good, np.concatenate([outside[~to_end], shown.gone.room[lone]]), np.full(len(row), np.nan)
-    crossed = _Ends(follower, row, branch, True).between(good, bad, good, rooms)
+    end = crossing.value(1, t)
+    if len(vanishing.row):
+        end = np.where(ending[~to_end], merging[place], end)
+    inner, outer = np.concatenate([crossing.value(0, t), merging[single]]), np.concatenate([end, short.value(0, t)])
+    at_inner = np.concatenate([room0[~to_end], room[single]])
+    rooms = at_inner, np.concatenate([room1[~to_end], summary.gone.room[single]]), np.full(len(row), np.nan)
+    crossed = _Ends(follower, row, branch, True).between(inner, outer, inner, rooms)
     legal[~to_end] = crossed[: len(crossing.row)]
-    return Places(merged, legal, short, (merged[lone], crossed[len(crossing.row) :]))
+    return Places(merging, legal, short, (merging[single], crossed[len(crossing.row) :]))
 
 
 def number_of(changes: Changes, row: Int, k: Int, branch: Int, K: int) -> Int:

@@ -36,29 +36,29 @@ class Points(NamedTuple):
         return np.asarray(self.step < tol.PAIR_SETTLED)
 
 
-def onto_curves(follower: Follower, row: Int, q: Array, last: Array, enough: float = tol.PAIR_SETTLED) -> Points:
+def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: float = tol.PAIR_SETTLED) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
-    The tangents point to where last does. enough: size of a step that is the last one.
+    The tangents point to where last does. tolerance: size of a step that is the last one.
     """
     parts = slices(max(len(q), 1), AT_ONCE)
-    return stack_rows([_move_chunk(follower, row[part], q[part], last[part], enough) for part in parts])
+    return stack_rows([_move_chunk(follower, row[part], q[part], last[part], tolerance) for part in parts])
 
 
-def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: float) -> Points:
+def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float) -> Points:
     """Postures moved as `onto_curves` does, so few that they stay in the cache."""
     arm, task, unit = follower.arm, follower.free.task, radian_or_reach(follower.arm)
     target = follower.target[row]
     q, tangent = q.copy(), last.copy()
-    size, going = np.full(len(q), np.inf), np.arange(len(q))
+    size, active = np.full(len(q), np.inf), np.arange(len(q))
     for _ in range(NEWTON):
-        if not len(going):
+        if not len(active):
             break
-        part = slice(None) if len(going) == len(q) else going
-        missing, J = newton.scaled(arm, task, q[part], target[part])
+        part = slice(None) if len(active) == len(q) else active
+        residual, J = newton.scaled(arm, task, q[part], target[part])
         rows = np.concatenate([J, last[part, None]], axis=1)
         right = np.zeros((*rows.shape[:2], 2))
-        right[:, :-1, 0], right[:, -1, 1] = missing, 1.0
+        right[:, :-1, 0], right[:, -1, 1] = residual, 1.0
         # the direction of a tool's axis is three numbers for two constraints
         x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
         step = x[:, :, 0]
@@ -66,7 +66,7 @@ def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, enough: flo
         longest = np.abs(step).max(axis=1)
         q[part] += step * np.minimum(1.0, MAX_STEP / np.maximum(longest, MAX_STEP))[:, None] * unit
         size[part] = np.where(np.isnan(longest), np.inf, longest)
-        going = going[~(size[part] < enough)]  # the residual left is the square of the step
+        active = active[~(size[part] < tolerance)]  # the residual left is the square of the step
     return Points(q, tangent, size)
 
 

@@ -69,29 +69,29 @@ class Planes(NamedTuple):
     def answers(self, row: Int, plane: Int, q: Array) -> tuple[Nodes, Int]:
         """Postures (M, n) moved along their planes (M,) onto curves, each once, and which of them are (K,)."""
         points = onto_curves(self.follower, row, q, self.held(len(q)), tol.SAME_SEED)
-        good = np.flatnonzero(points.step < tol.SAME_SEED)
-        good = good[first_of_equals(self.follower, self.place(row[good], plane[good]), points.q[good])]
-        return Nodes(row[good], plane[good], rows_of(points, good)), good
+        rows = np.flatnonzero(points.step < tol.SAME_SEED)
+        rows = rows[first_of_equals(self.follower, self.place(row[rows], plane[rows]), points.q[rows])]
+        return Nodes(row[rows], plane[rows], rows_of(points, rows)), rows
 
 
-def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
+def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
     """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
 
-    whose: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
+    owner: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
     """
-    guide, even, N = nearly_closed(follower.arm, follower.free), over_a_turn(PLANES), len(follower.target)
-    row, t = np.repeat(np.arange(N), PLANES), np.tile(even, N)
+    guide, values, N = nearly_closed(follower.arm, follower.free), over_a_turn(PLANES), len(follower.target)
+    row, t = np.repeat(np.arange(N), PLANES), np.tile(values, N)
     source = follower._replace(free=guide)
     if guide is follower.free:
         q = follower.branches_at(row, t)
         solving, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
-        q, missed = source.candidates(row, t)
-        more, extra = _answers_between(source, even, missed.reshape(N, PLANES, -1))
-        more, extra = np.append(more, whose), np.append(extra, postures, axis=0)
-        row, t = np.append(row, more), np.append(t, extra[:, guide.joint])
-        beside = source.candidates(more, t[N * PLANES :])
-        q, solving = np.append(q, beside[0], axis=0), np.append(missed, beside[1], axis=0) < tol.NEAR_DEFECT
+        q, defect = source.candidates(row, t)
+        rows, extra = _answers_between(source, values, defect.reshape(N, PLANES, -1))
+        rows, extra = np.append(rows, owner), np.append(extra, postures, axis=0)
+        row, t = np.append(row, rows), np.append(t, extra[:, guide.joint])
+        candidates = source.candidates(rows, t[N * PLANES :])
+        q, solving = np.append(q, candidates[0], axis=0), np.append(defect, candidates[1], axis=0) < tol.NEAR_DEFECT
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
@@ -101,27 +101,27 @@ def answers_on_planes(follower: Follower, whose: Int, postures: Array) -> tuple[
     last = np.arange(N * PLANES, len(row))  # rows between are answers already, of no branch
     start = np.append(q[sample, branch], extra, axis=0)
     sample, branch = np.append(sample, last), np.append(branch, np.full(len(last), q.shape[1]))
-    nodes, good = planes.answers(row[sample], plane[sample], start)
+    nodes, index = planes.answers(row[sample], plane[sample], start)
     grid = np.full((*planes.values.shape, q.shape[1] + 1), -1)
-    grid[nodes.row, nodes.plane, branch[good]] = np.arange(len(good))
+    grid[nodes.row, nodes.plane, branch[index]] = np.arange(len(index))
     return planes, nodes, grid[:, :, :-1]
 
 
-def _answers_between(source: Follower, t: Array, missed: Array) -> tuple[Int, Array]:
+def _answers_between(source: Follower, t: Array, defect: Array) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) where these may be between values t (K,) alone, as what branches miss (N, K, B)
     tells: of a short curve, whose joint cannot be held where it turns back."""
     width, part = t[1] - t[0], np.arange(1, WAY_PARTS) / WAY_PARTS
-    misses = np.where(missed <= tol.ACCEPTED, np.nan, -missed)
-    row, k = np.nonzero(may_turn_back(misses, np.broadcast_to(t, missed.shape[:2])).any(axis=2))
+    misses = np.where(defect <= tol.ACCEPTED, np.nan, -defect)
+    row, k = np.nonzero(may_turn_back(misses, np.broadcast_to(t, defect.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
-    q, missed = source.candidates(row, values)
-    best = missed.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
-    place, branch = np.nonzero(missed[best] < tol.NEAR_DEFECT)
-    row, q = row[best[place]], q[best[place], branch]
+    q, defect = source.candidates(row, values)
+    best_row = defect.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
+    place, branch = np.nonzero(defect[best_row] < tol.NEAR_DEFECT)
+    row, q = row[best_row[place]], q[best_row[place], branch]
     q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
-    good = np.flatnonzero(miss < tol.SAME_SEED)
-    good = good[first_of_equals(source, row[good], q[good])]
-    return row[good], q[good]
+    rows = np.flatnonzero(miss < tol.SAME_SEED)
+    rows = rows[first_of_equals(source, row[rows], q[rows])]
+    return row[rows], q[rows]
 
 
 def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
@@ -129,8 +129,8 @@ def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]
-    close = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
-    twin = np.flatnonzero(close)
+    similar = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
+    twin = np.flatnonzero(similar)
     unique = np.ones(len(q), bool)
     unique[second[twin[newton.wrapped_distance(follower.arm, q[first[twin]], q[second[twin]]) < tol.SAME_SEED]]] = False
     return unique
@@ -143,34 +143,32 @@ def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int)
     if guide is follower.free or follower.arm.prismatic[joint]:
         return row[:0], points.q[:0]
     parts = [_off_curves_at(follower, joint, value, points, row, after) for value in VALUES]
-    whose, q = (np.concatenate(column) for column in zip(*parts, strict=True))
-    return whose, q
+    target, q = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return target, q
 
 
-def _off_curves_at(
-    follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int
-) -> tuple[Int, Array]:
+def _off_curves_at(follower: Follower, j: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Answers (M, n) off the curves with the joint at a value, and whose they are (M,)."""
-    held_arm = arm_without(follower.arm, ((follower.arm.joint_names[joint], value),))
+    held_arm = arm_without(follower.arm, ((follower.arm.joint_names[j], value),))
     s = follower.ik(held_arm, follower.target, follower.free.task.name, examine=False)
-    whose, branch = np.nonzero(s.valid)
-    q = np.insert(s.q[whose, branch], joint, value, axis=1)
-    crossing, owner = _crossings(follower, joint, value, points, row, after)
+    target, branch = np.nonzero(s.valid)
+    q = np.insert(s.q[target, branch], j, value, axis=1)
+    crossing, owner = _crossings(follower, j, value, points, row, after)
     order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(follower.target))
     place = np.arange(int(count.max(initial=0)))
-    pair, k = np.nonzero(place < count[whose, None])
-    index = order[(np.cumsum(count) - count)[whose[pair]] + k]
-    passed = np.zeros(len(q), bool)
-    passed[pair[newton.wrapped_distance(follower.arm, q[pair], crossing[index]) < ON_CURVE]] = True
-    return whose[~passed], q[~passed]
+    pair, k = np.nonzero(place < count[target, None])
+    index = order[(np.cumsum(count) - count)[target[pair]] + k]
+    on_curve = np.zeros(len(q), bool)
+    on_curve[pair[newton.wrapped_distance(follower.arm, q[pair], crossing[index]) < ON_CURVE]] = True
+    return target[~on_curve], q[~on_curve]
 
 
 def _crossings(follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
     """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
-    away, change = wrap_angle(points.q[:, joint] - value), wrap_angle(points.q[after, joint] - points.q[:, joint])
-    begins = np.flatnonzero((away * (away + change) <= 0) & (change != 0))
-    ways = Ways.between(follower, rows_of(points, begins), rows_of(points, after[begins]))
-    share = -away[begins] / change[begins]
+    gap, change = wrap_angle(points.q[:, joint] - value), wrap_angle(points.q[after, joint] - points.q[:, joint])
+    begins = np.flatnonzero((gap * (gap + change) <= 0) & (change != 0))
+    cubics = Ways.between(follower, rows_of(points, begins), rows_of(points, after[begins]))
+    share = -gap[begins] / change[begins]
     for _ in range(SECANTS):
-        share = np.clip(share - wrap_angle(ways.at(follower, share)[:, joint] - value) / change[begins], 0.0, 1.0)
-    return ways.at(follower, share), row[begins]
+        share = np.clip(share - wrap_angle(cubics.at(follower, share)[:, joint] - value) / change[begins], 0.0, 1.0)
+    return cubics.at(follower, share), row[begins]

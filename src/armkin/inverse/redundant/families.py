@@ -63,8 +63,8 @@ def families(
     nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(goal), arm.n))
     srs = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
-    roundings, most = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
-    stands = (newton.misses(arm, task, nears, goal) <= most) & ~outside_limits(arm, nears).any(axis=1)
+    roundings, limit = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
+    stands = (newton.misses(arm, task, nears, goal) <= limit) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
     followed = AT_ONCE // SAMPLES if free.by_formula else TRACED
     chunk = CIRCLES if srs else followed
@@ -123,18 +123,18 @@ def method_of_families(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
     if free.about_tool_axis:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
         return f"families of {joint}", why + free.geometry.why, free.geometry.complete
-    turned, complete = actual_arm(arm), False
-    if free.joint and arm_angle(turned) is not None:
-        how, complete = "in closed form by the arm angle", True
-    elif free.joint and free.by_formula and boundaries(turned) is not None:
-        how, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
+    actual, complete = actual_arm(arm), False
+    if free.joint and arm_angle(actual) is not None:
+        manner, complete = "in closed form by the arm angle", True
+    elif free.joint and free.by_formula and boundaries(actual) is not None:
+        manner, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
     elif free.by_formula:
-        how = f"{free.geometry.name}, at {SAMPLES} values of it"
+        manner = f"{free.geometry.name}, at {SAMPLES} values of it"
     else:
-        guide = nearly_closed(turned, free)
+        guide = nearly_closed(actual, free)
         name = free.geometry.name if guide is free else f"near {guide.geometry.name}"
-        how = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
-    why = f"{joint} is redundant: ik lists the intervals of its values; the others: {how}"
+        manner = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
+    why = f"{joint} is redundant: ik lists the intervals of its values; the others: {manner}"
     return f"families of {joint}", why, complete
 
 
@@ -159,8 +159,8 @@ class _Rows:
         q = _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
             q = curves.settle(pieces, q)
-        standing = np.flatnonzero(self.stands[begin + pieces.row])
-        q[standing] = _with_near(self.arm, self.joint, rows_of(pieces, standing), q[standing], near[standing])
+        near_rows = np.flatnonzero(self.stands[begin + pieces.row])
+        q[near_rows] = _with_near(self.arm, self.joint, rows_of(pieces, near_rows), q[near_rows], near[near_rows])
         if self.arm.keep_out:
             q = _with_free_postures(self.arm, curves, q, near)
         full_turn = pieces.b - pieces.a >= 2 * np.pi
@@ -177,9 +177,9 @@ class _Rows:
         All postures of a stretched arm may lie within less than a sample, or be one.
         """
         answered = [part[0] for part in self.parts]
-        lost = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *answered]))
-        sought = lost & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
-        for k in np.flatnonzero(lost & (self.stands | sought)).tolist():
+        empty = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *answered]))
+        sought = empty & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
+        for k in np.flatnonzero(empty & (self.stands | sought)).tolist():
             q, goal = self.near[k][None], target[[k]]
             if not self.stands[k]:
                 q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
@@ -187,9 +187,9 @@ class _Rows:
                 q = q[newton.misses(self.arm, task, q, np.repeat(goal, len(q), axis=0)) <= tol.SOLUTION]
             if len(q):
                 q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))
-                best = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])
-                value = np.full((1, 2), q[best, self.joint])
-                self.parts.append((np.array([k]), q[[best]], value, legal[[best]], np.zeros(1, np.intp)))
+                nearest = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])
+                value = np.full((1, 2), q[nearest, self.joint])
+                self.parts.append((np.array([k]), q[[nearest]], value, legal[[nearest]], np.zeros(1, np.intp)))
 
     def stack_parts(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
         """q (N, B, n), intervals (N, B, 2), whether legal and the branch (N, B), -1 where there is no row."""
@@ -220,8 +220,8 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
         """Motion (R,) from near to the legal postures at t, inf where none is legal; better ones are kept."""
         q, legal = curves.at(rows_of(curves.pieces, rows), t)
         cost = np.where(legal, motion(arm, q, near[rows]), np.inf)
-        better = cost < least[rows]
-        best[rows[better]], least[rows[better]] = q[better], cost[better]
+        is_better = cost < least[rows]
+        best[rows[is_better]], least[rows[is_better]] = q[is_better], cost[is_better]
         return np.asarray(cost)
 
     rows = np.flatnonzero(curves.pieces.legal)
@@ -232,8 +232,8 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
             costs(rows, t)
     # a sample beside which the motion grows both ways is at a kink or limit, and the nearest posture itself
     p = rows_of(curves.pieces, rows)
-    beside = [costs(rows, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
-    rows = rows[np.minimum(*beside) < motion(arm, p.start, near[rows])]
+    side_costs = [costs(rows, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
+    rows = rows[np.minimum(*side_costs) < motion(arm, p.start, near[rows])]
     p = rows_of(curves.pieces, rows)
     low, high, middle, value = golden_section(lambda t: costs(rows, t), p.low, p.high, curves.steps)
     if len(rows):  # in what is left: by a secant where a joint passes its near, a kink of the motion; by a parabola
@@ -253,16 +253,16 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
 
     It may be a posture with a joint that is free, or one that its target's rounding moves far.
     """
-    middle, half = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
-    inside = np.abs(wrap_angle(near[:, joint] - middle)) <= half + tol.SAME
-    cost = np.where(pieces.legal & inside, motion(arm, q, near), np.inf)
-    placed = q.copy()
+    middle, half_width = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
+    in_interval = np.abs(wrap_angle(near[:, joint] - middle)) <= half_width + tol.SAME
+    cost = np.where(pieces.legal & in_interval, motion(arm, q, near), np.inf)
+    postures = q.copy()
     for row in np.unique(pieces.row).tolist():
         members = np.flatnonzero(pieces.row == row)
-        best = members[cost[members].argmin()]
-        if np.isfinite(cost[best]):
-            placed[best] = near[best]
-    return placed
+        nearest = members[cost[members].argmin()]
+        if np.isfinite(cost[nearest]):
+            postures[nearest] = near[nearest]
+    return postures
 
 
 def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
@@ -272,9 +272,9 @@ def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Arra
         a, b = pieces.first[p], pieces.last[p]
         t = np.linspace(a, b, max(int((b - a) / FREE_STEP) + 2, 2))[1:-1]
         postures, legal = curves.at(rows_of(pieces, np.full(len(t), p)), t)
-        good = legal & hits_nothing(arm, np.nan_to_num(postures))
-        if good.any():
-            freed[p] = postures[np.where(good, motion(arm, postures, near[p]), np.inf).argmin()]
+        is_free = legal & hits_nothing(arm, np.nan_to_num(postures))
+        if is_free.any():
+            freed[p] = postures[np.where(is_free, motion(arm, postures, near[p]), np.inf).argmin()]
     return freed
 
 

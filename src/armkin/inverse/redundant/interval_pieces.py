@@ -43,36 +43,36 @@ def motion(arm: Arm, q: Array, near: Array) -> Array:
 
 def motion_of_joint(arm: Arm, j: int, value: Array, near: Array) -> Array:
     """|change| of joint j from near [deg | mm]."""
-    way = np.abs(value - near)
-    return way if arm.prismatic[j] else way * (180 / np.pi)
+    change = np.abs(value - near)
+    return change if arm.prismatic[j] else change * (180 / np.pi)
 
 
-def runs(good: Bool, breaks: Bool) -> tuple[Int, Int, Int]:
-    """Runs of good (M, K), round the end of the last axis; breaks (M, K): a run that comes there ends before it.
+def runs(flags: Bool, breaks: Bool) -> tuple[Int, Int, Int]:
+    """Runs of flags (M, K), round the end of the last axis; breaks (M, K): a run that comes there ends before it.
 
     Returns of each its row, first sample and length. A run of all samples begins at the first one.
     """
-    M, K = good.shape
-    begins = good & (breaks | ~np.roll(good, 1, axis=1))
-    begins[:, 0] |= (good & ~breaks).all(axis=1)
+    M, K = flags.shape
+    begins = flags & (breaks | ~np.roll(flags, 1, axis=1))
+    begins[:, 0] |= (flags & ~breaks).all(axis=1)
     row, first = np.nonzero(begins)
-    stops = np.flatnonzero(breaks | ~good)
+    stops = np.flatnonzero(breaks | ~flags)
     # the next stop behind the first sample, or round the end the first one of the row
     begin, end = np.searchsorted(stops, K * np.arange(M)), np.append(stops, M * K)
-    behind = end[np.searchsorted(stops, K * row + first + 1)]
-    around = end[begin[row]]
-    length = np.where(behind < K * (row + 1), behind, np.where(around < K * (row + 1), around + K, M * K + K))
+    stop = end[np.searchsorted(stops, K * row + first + 1)]
+    wrapped = end[begin[row]]
+    length = np.where(stop < K * (row + 1), stop, np.where(wrapped < K * (row + 1), wrapped + K, M * K + K))
     return row, first, np.minimum(length - K * row - first, K)
 
 
-def holding_none(good: Bool, row: Int, first: Int, length: Int) -> Bool:
-    """Which runs hold none of the good samples (M, K): (R,); they may go round the end of the last axis."""
-    K = good.shape[1]
-    so_far = np.append(0, np.cumsum(good))
+def holding_none(flags: Bool, row: Int, first: Int, length: Int) -> Bool:
+    """Which runs hold none of the flags (M, K): (R,); they may go round the end of the last axis."""
+    K = flags.shape[1]
+    so_far = np.append(0, np.cumsum(flags))
     begin, end = K * row, K * row + K
     last = begin + first + length
-    before_end, behind = np.minimum(last, end), begin + np.maximum(last - end, 0)
-    return np.asarray(so_far[before_end] - so_far[begin + first] + so_far[behind] - so_far[begin] == 0)
+    before_end, past_end = np.minimum(last, end), begin + np.maximum(last - end, 0)
+    return np.asarray(so_far[before_end] - so_far[begin + first] + so_far[past_end] - so_far[begin] == 0)
 
 
 def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
@@ -82,8 +82,8 @@ def best_samples(cost: Array, curve: Int, first: Int, count: Int) -> Int:
     sample = np.repeat(first, count) + index
     costs = cost.ravel()[np.repeat(curve * K, count) + np.where(sample < K, sample, sample - K)]
     begin = np.cumsum(count) - count
-    least = np.minimum.reduceat(costs, begin)
-    least_at = np.flatnonzero(costs == np.repeat(least, count))
+    min_cost = np.minimum.reduceat(costs, begin)
+    least_at = np.flatnonzero(costs == np.repeat(min_cost, count))
     return np.asarray(index[least_at[np.searchsorted(least_at, begin)]])
 
 
@@ -100,9 +100,9 @@ def within_limits(arm: Arm, j: int, value: Array, room: Array) -> None:
     lower, upper = float(arm.lower[j]), float(arm.upper[j])
     if not np.isfinite(lower) or not np.isfinite(upper) or (not arm.prismatic[j] and upper - lower >= 2 * np.pi):
         return
-    away = value - 0.5 * (lower + upper)
-    away = np.abs(away if arm.prismatic[j] else wrap_angle(away))
-    np.minimum(room, 0.5 * (upper - lower) - away, out=room)
+    offset = value - 0.5 * (lower + upper)
+    offset = np.abs(offset if arm.prismatic[j] else wrap_angle(offset))
+    np.minimum(room, 0.5 * (upper - lower) - offset, out=room)
 
 
 def may_turn_back(values: Array, t: Array) -> Bool:
@@ -112,17 +112,16 @@ def may_turn_back(values: Array, t: Array) -> Bool:
     following = np.roll(values, -1, axis=1)
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = (following - values) / width
-        ahead = values + width * np.roll(slope, 1, axis=1)
-        back = following - width * np.roll(slope, -1, axis=1)
-        up, down = (values < 0) & (following < 0), (values > 0) & (following > 0)
-        return np.asarray((up & (ahead > 0) & (back > 0)) | (down & (ahead < 0) & (back < 0)))
+        forward = values + width * np.roll(slope, 1, axis=1)
+        backward = following - width * np.roll(slope, -1, axis=1)
+        negative, positive = (values < 0) & (following < 0), (values > 0) & (following > 0)
+        return np.asarray((negative & (forward > 0) & (backward > 0)) | (positive & (forward < 0) & (backward < 0)))
 
 
 def golden_section(
     cost: Callable[[Array], Array], low: Array, high: Array, steps: int
 ) -> tuple[Array, Array, Array, Array]:
-    """A minimum each of a cost between low and high (M,): the ends that are left, the lower of the two places between
-    them, and its cost."""
+    """A minimum each of a cost between low and high (M,): the ends left, the lower of two places between, its cost."""
     ratio = (5**0.5 - 1) / 2
     left, right = high - ratio * (high - low), low + ratio * (high - low)
     at_left, at_right = cost(left), cost(right)

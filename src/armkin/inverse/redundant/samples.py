@@ -108,39 +108,38 @@ def summary_of_samples(follower: Follower, t: Array, places: Array | None = None
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))
     if places is None:
         return stack_rows([_summarise(follower.samples_at(rows, t), rows, False) for rows in parts])
-    more = on_both_sides(places)
-    return stack_rows([_summarise(follower.samples_at(rows, t, more[rows]), rows, True) for rows in parts])
+    extra = on_both_sides(places)
+    return stack_rows([_summarise(follower.samples_at(rows, t, extra[rows]), rows, True) for rows in parts])
 
 
 def place_between(t: Array, changes: Changes, places: Array) -> Array:
-    """The one of places (N, V) of a turn that each change (M,) between samples at t (N, K) is at; inf where there is
-    none."""
+    """The place, of (N, V) on a turn, of each change (M,) between samples at t (N, K); inf where there is none."""
     low, nearby = value_at(t, changes.row, changes.k)[:, None], places[changes.row]
     width = value_at(t, changes.row, changes.k + 1)[:, None] - low
     with np.errstate(invalid="ignore"):
-        ahead = np.remainder(nearby - low, 2 * np.pi)
-        return np.asarray(np.where(ahead <= width, low + ahead, np.inf).min(axis=1, initial=np.inf))
+        distance = np.remainder(nearby - low, 2 * np.pi)
+        return np.asarray(np.where(distance <= width, low + distance, np.inf).min(axis=1, initial=np.inf))
 
 
-def _summarise(sampled: Sampled, rows: Int, sure: bool) -> Summary:
-    """What samples of some targets, rows (S,) of all, show; sure: nothing happens between them that they do not."""
+def _summarise(sampled: Sampled, rows: Int, complete: bool) -> Summary:
+    """What samples of some targets, rows (S,) of all, show; complete: nothing happens between them that they do not."""
     valid, legal, room = sampled.valid, sampled.legal, sampled.room
     gone, crossed = Changes.of(valid), Changes.of(legal)
     K, every = valid.shape[1], np.arange(len(gone.row))
-    last, before = gone.sample(0, K), gone.sample(-1, K)
-    twin, apart = nearest_other(sampled.postures(gone.row, last), gone.branch)[1:]
-    postures = sampled.postures(gone.row, before)
-    earlier = np.where(np.isnan(postures[every, gone.branch, 0]), np.nan, nearest_other(postures, gone.branch)[2])
+    last, previous = gone.sample(0, K), gone.sample(-1, K)
+    twin, gap = nearest_other(sampled.postures(gone.row, last), gone.branch)[1:]
+    postures = sampled.postures(gone.row, previous)
+    gap_back = np.where(np.isnan(postures[every, gone.branch, 0]), np.nan, nearest_other(postures, gone.branch)[2])
     cells = gone.row, last, gone.branch
     rooms = [room[crossed.row, crossed.sample(k, K), crossed.branch] for k in (0, 1)]
-    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if sure else may_turn_back(room, sampled.t))
+    row, k, branch = turns = np.nonzero(np.zeros_like(valid) if complete else may_turn_back(room, sampled.t))
     hidden: Bool = np.zeros(len(rows), bool)
-    if not sure:
+    if not complete:
         misses = np.where(valid, np.nan, -np.sqrt(sampled.missed))
         hidden = np.asarray(may_turn_back(misses, sampled.t).any(axis=(1, 2)))
     present = _runs(sampled, valid, rows)
     return Summary(
-        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([apart, earlier], axis=1), room[cells], legal[cells]),
+        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([gap, gap_back], axis=1), room[cells], legal[cells]),
         Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
         Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
         _runs(sampled, legal, rows),
@@ -153,38 +152,37 @@ def _summarise(sampled: Sampled, rows: Int, sure: bool) -> Summary:
 
 
 def nearest_other(q: Array, branch: Int) -> tuple[Array, Int, Array]:
-    """The nearest other one to branches (M,) among postures (M, B, n): how far its joints are (M, n), which one (M,),
-    squared (M,)."""
+    """The nearest other of postures (M, B, n) to branches (M,): joint changes (M, n), number (M,), distance^2 (M,)."""
     index = np.arange(len(q))
-    away = wrap_angle(q - q[index, branch][:, None])
-    apart = (away**2).sum(axis=2)
-    apart[index, branch] = np.inf
-    apart = np.where(np.isnan(apart), np.inf, apart)
-    nearest = apart.argmin(axis=1)
-    return away[index, nearest], nearest, apart[index, nearest]
+    change = wrap_angle(q - q[index, branch][:, None])
+    square = (change**2).sum(axis=2)
+    square[index, branch] = np.inf
+    square = np.where(np.isnan(square), np.inf, square)
+    nearest = square.argmin(axis=1)
+    return change[index, nearest], nearest, square[index, nearest]
 
 
-def _runs(sampled: Sampled, good: Bool, rows: Int) -> Runs:
-    """The runs of good samples (S, K, B)."""
-    K, B = good.shape[1:]
-    samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (good, sampled.legal))
+def _runs(sampled: Sampled, mask: Bool, rows: Int) -> Runs:
+    """The runs of samples of a mask (S, K, B)."""
+    K, B = mask.shape[1:]
+    samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (mask, sampled.legal))
     cost = sampled.cost.transpose(0, 2, 1).reshape(-1, K)
     curve, first, length = runs(samples, np.zeros_like(samples))
-    best = best_samples(cost, curve, first, length) if len(curve) else first
+    best_sample = best_samples(cost, curve, first, length) if len(curve) else first
     row, branch = curve // B, curve % B
-    start = sampled.postures(row, (first + best) % K)[np.arange(len(row)), branch]
-    return Runs(rows[row], branch, first, length, best, start, ~holding_none(legal, curve, first, length))
+    start = sampled.postures(row, (first + best_sample) % K)[np.arange(len(row)), branch]
+    return Runs(rows[row], branch, first, length, best_sample, start, ~holding_none(legal, curve, first, length))
 
 
 def _all_short(sampled: Sampled, row: Int, first: Int, length: Int) -> Bool:
     """Whether no joint moves by REACH along any family of a target (S,), of which runs (R,) of samples are there."""
-    wide = value_at(sampled.t, row, first + length - 1) - value_at(sampled.t, row, first) > tol.REACH
-    short = np.asarray(sampled.valid.any(axis=(1, 2)))
-    short[row[wide]] = False
-    for k in np.flatnonzero(short).tolist():
+    over_reach = value_at(sampled.t, row, first + length - 1) - value_at(sampled.t, row, first) > tol.REACH
+    is_short = np.asarray(sampled.valid.any(axis=(1, 2)))
+    is_short[row[over_reach]] = False
+    for k in np.flatnonzero(is_short).tolist():
         K, valid = sampled.valid.shape[1], sampled.valid[k]
         q = sampled.postures(np.full(K, k), np.arange(K))
         step = np.abs(wrap_angle(np.roll(q, -1, axis=0) - q))
-        way = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
-        short[k] = 2.0 * way.max(initial=0.0) < tol.REACH
-    return short
+        travel = np.where((valid & np.roll(valid, -1, axis=0))[..., None], np.nan_to_num(step), 0.0).sum(axis=0)
+        is_short[k] = 2.0 * travel.max(initial=0.0) < tol.REACH
+    return is_short
