@@ -119,21 +119,23 @@ def solve_by(  # noqa: C901 - the examinations after the closed form, in their o
     nears = np.broadcast_to(reference, (len(targets), arm.n)) if is_shared else reference.reshape(-1, arm.n)
     common = reference if reference.ndim == 1 else None
     if geometry.pairs:
-        batch, count, target, shown, rows = chunks.solve(arm, task, geometry, targets, nears, common, examine, workers)
-        if len(rows):
-            batch = _by_slower_class(Goals(arm, task, target, nears), geometry.doubts, batch, rows, examine, workers)
+        solved = chunks.solve(Goals(arm, task, targets, nears), geometry, common, examine, workers)
+        batch, count, target, defect, unsolved = solved
+        goals = Goals(arm, task, target, nears)
+        if len(unsolved):
+            batch = _by_slower_class(goals, geometry.doubts, batch, unsolved, examine, workers)
     else:
-        target, _, shown = read_targets(task, values)
+        target, _, defect = read_targets(task, values)
         target = target.copy() if np.may_share_memory(target, values) else target  # the caller may change its arrays
-        batch, count = _row_by_row(Goals(arm, task, target, nears), geometry, examine, workers)
-    shown, thresholds = target_rounding.of_targets(arm, task, target, (targets, shown), single, rounding, batch_shape)
-    goals = Goals(arm, task, target, nears)
+        goals = Goals(arm, task, target, nears)
+        batch, count = _row_by_row(goals, geometry, examine, workers)
+    rounded, bounds = target_rounding.of_targets(arm, task, target, (targets, defect), single, rounding, batch_shape)
     if examine:
         edge = np.flatnonzero((batch.status == Status.BOUNDARY) | (batch.status == Status.SINGULAR))
         if len(illegal := edge[~batch.within[edge].any(axis=1)]):
             batch = legal_postures.with_legal_postures(goals, batch, illegal)
-        if thresholds.max(initial=0.0) > near_itself.ROUNDED:
-            batch = near_itself.stand(goals, batch, thresholds)
+        if bounds.max(initial=0.0) > near_itself.ROUNDED:
+            batch = near_itself.list_near(goals, batch, bounds)
         if arm.keep_out:
             batch = legal_postures.with_free_postures(goals, batch)
     if arm.prismatic.any():
@@ -142,7 +144,7 @@ def solve_by(  # noqa: C901 - the examinations after the closed form, in their o
         batch.branch[...] = follow_branches(arm, task, batch.q, target)
     names = branch_names(arm, task, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
-    return as_solutions(goals, reference, batch_shape, batch, shown, (names, geometry.name, geometry.why))
+    return as_solutions(goals, reference, batch_shape, batch, rounded, (names, geometry.name, geometry.why))
 
 
 def columns(
@@ -184,12 +186,12 @@ def _by_slower_class(
 ) -> Batch:
     """The batch after solving targets in doubt by the slower class that the closed form names."""
     assert geometry is not None
-    part = arm, task, target, near = goals.of(doubted)
+    part = goals.of(doubted)
     if not geometry.pairs:
         return replace_rows(batch, doubted, _row_by_row(part, geometry, examine, workers)[0])
-    solved, _, target, _, rest = chunks.solve(arm, task, geometry, target, near, None, examine, workers)
-    if len(rest):
-        solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, rest, examine, workers)
+    solved, _, target, _, unsolved = chunks.solve(part, geometry, None, examine, workers)
+    if len(unsolved):
+        solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, unsolved, examine, workers)
     return replace_rows(batch, doubted, solved)
 
 
@@ -212,7 +214,7 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     for rows in arrays.slices(len(count), arrays.CHUNK):
         pack_branches(rows_of(batch, rows), count[rows])
     if examine:
-        doubt[near_itself.take(goals, batch, near_itself.at_tip(arm, task, target, position(arm, near)))] = True
+        doubt[near_itself.put_near(goals, batch, near_itself.at_tip(arm, task, target, position(arm, near)))] = True
     doubted = np.flatnonzero(doubt)
     if examine and len(doubted):
         candidates = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)

@@ -62,7 +62,7 @@ ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, cons
 }
 
 /* Joints' ways x and the residual g along u, polynomials in t / span, of a branch whose curve stays at hand as far as span:
-   `_polynomials`. */
+   `_fit_polynomials`. */
 ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const double *u, const double *w, arm_branch *out,
     double *g)
 {

@@ -30,27 +30,32 @@ from armkin.model.arm import Arm
 TURNED_AT_ONCE = 512  # poses transposed at once, which fit a core's cache
 
 
-def solve(  # noqa: C901 - one pass over a batch's arrays
-    arm: Arm, task: Task, geometry: Geometry, raw: Array, near: Array, common: Array | None, examine: bool, workers: int
-) -> tuple[Batch, int, Array, Array, Int]:
-    """All branches of targets (N, m), or of poses (N, 4, 4) that have not been read yet.
+class Solved(NamedTuple):
+    """Targets solved by a closed form."""
 
-    near: (N, n), common: (n,) if it serves all; workers: threads. Also returns the number of branch columns, the solved
-    targets, their `rounding`, and those on an edge if the class has a slower solver for them.
-    """
+    batch: Batch
+    width: int  # branch columns of the class
+    target: Array  # (N, m) or (N, 4, 4), as read
+    rounding: Array  # (N,) defect of their rotations
+    unsolved: Int  # targets on an edge, if the class has a slower solver for them
+
+
+def solve(goals: Goals, geometry: Geometry, common: Array | None, examine: bool, workers: int) -> Solved:  # noqa: C901 - one pass over a batch's arrays
+    """All branches of targets, whose poses need not have been read yet; common: (n,) `near`, if one serves all."""
+    arm, task, raw, near = goals
     runner, N = recorded_formula(arm, task, geometry), len(raw)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts, which can share buffers
     batch = empty_batch(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(raw), np.zeros(N)
     tip = None if common is None else position(arm, common)
 
-    def part(rows: slice) -> list[Doubted]:
+    def solve_part(rows: slice) -> list[Doubted]:
         """Solve some rows in one thread; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
         on_edge: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal, columns, ref = raw[chunk], None, near[chunk] if common is None else common
+            goal, columns, close = raw[chunk], None, near[chunk] if common is None else common
             if task.orientation == "full":
                 goal, rounding[chunk], columns = read_poses(goal)
             target[chunk] = goal
@@ -58,37 +63,36 @@ def solve(  # noqa: C901 - one pass over a batch's arrays
                 values = runner.in_numbers(goal)
             else:
                 workspace = workspace or runner.code.workspace(len(goal))
-                room = [buffer[..., : len(goal)] for buffer in workspace]
-                values = list(runner.code.run(target_entries(task, goal) if columns is None else columns, room))
-            first = goal[:, 0] if columns is None else cast("Array", columns[9])
-            hits = np.empty(0, np.intp)
+                buffers = [buffer[..., : len(goal)] for buffer in workspace]
+                values = list(runner.code.run(target_entries(task, goal) if columns is None else columns, buffers))
+            x = goal[:, 0] if columns is None else cast("Array", columns[9])
+            at_tip = np.empty(0, np.intp)
             if examine:
-                hits = near_itself.at_tip(arm, task, goal, position(arm, ref) if tip is None else tip, first)
-            edge = _keep(Goals(arm, task, goal, near[chunk]), runner.axes, rows_of(batch, chunk), values, ref, hits)
-            if len(edge.rows):
-                on_edge.append(edge._replace(rows=start + edge.rows))
+                at_tip = near_itself.at_tip(arm, task, goal, position(arm, close) if tip is None else tip, x)
+            part = Goals(arm, task, goal, near[chunk])
+            doubted = _write(part, runner.axes, rows_of(batch, chunk), values, close, at_tip)
+            if len(doubted.rows):
+                on_edge.append(doubted._replace(rows=start + doubted.rows))
         return on_edge
 
-    parts = [part(slice(0, N))] if workers == 1 else share_rows(part, N, workers, step, step)
-    doubted = [chunk for one_part in parts for chunk in one_part]
+    parts = [solve_part(slice(0, N))] if workers == 1 else share_rows(solve_part, N, workers, step, step)
+    doubted = [chunk for on_edge in parts for chunk in on_edge]
     batch.complete[...] = geometry.complete
-    edge = np.concatenate([np.empty(0, np.intp), *(chunk.rows for chunk in doubted)])
+    rows = np.concatenate([np.empty(0, np.intp), *(chunk.rows for chunk in doubted)])
     if geometry.doubts is None:
         if examine and doubted:
-            goals = Goals(arm, task, target, near)
+            goals = goals._replace(target=target)
             if any(chunk.plain.any() for chunk in doubted) and not geometry.ends:
-                edge = decide_folds(goals, runner, batch, stack_rows(doubted))
-            for start in range(0, len(edge), AT_ONCE):
-                batch = decide_edges(goals, runner, batch, edge[start : start + AT_ONCE])
-        edge = edge[:0]
-    return batch, math.prod(runner.axes), target, rounding, edge
+                rows = decide_folds(goals, runner, batch, stack_rows(doubted))
+            for start in range(0, len(rows), AT_ONCE):
+                batch = decide_edges(goals, runner, batch, rows[start : start + AT_ONCE])
+        rows = rows[:0]
+    return Solved(batch, math.prod(runner.axes), target, rounding, rows)
 
 
-def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, hits: Int) -> Doubted:
+def _write(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, at_tip: Int) -> Doubted:
     """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
-    targets on an edge.
-
-    hits: the result of `near_itself.at_tip`, empty without examination.
+    targets on an edge. at_tip: the result of `near_itself.at_tip`, empty without examination.
     """
     arm = goals.arm
     *values, miss, doubt, free = outputs
@@ -96,28 +100,28 @@ def _keep(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], 
     shape, B = (*axes, N), math.prod(axes)
     miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
     valid = within = miss <= tol.ACCEPTED**2
-    full, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
+    all_valid, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
     for i, value in enumerate(values):
         lower, upper = float(arm.lower[i]), float(arm.upper[i])
         reference = float(near[i]) if near.ndim == 1 else near[:, i]
-        value, inside = nearest_copy(value, reference, lower, upper, bool(arm.prismatic[i]))
+        value, is_inside = nearest_copy(value, reference, lower, upper, bool(arm.prismatic[i]))
         legal[..., i, :] = value
-        if inside is not True:
-            within = (within.reshape(shape) & inside).reshape(B, N)
+        if is_inside is not True:
+            within = (within.reshape(shape) & is_inside).reshape(B, N)
     columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
     for chunk in arrays.slices(N, TURNED_AT_ONCE):
         rows[chunk] = columns[:, chunk].T
-    part.valid[...] = True if full else valid.T
+    part.valid[...] = True if all_valid else valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
-    on_edge = _on_edge(doubt, miss, None if full else valid)
-    if len(hits):
-        on_edge = np.union1d(on_edge, near_itself.take(goals, part, hits))
+    on_edge = _on_edge(doubt, miss, None if all_valid else valid)
+    if len(at_tip):
+        on_edge = np.union1d(on_edge, near_itself.put_near(goals, part, at_tip))
     flags = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in (miss.reshape(shape), doubt, free))
     missed, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
-    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, hits, invert=True))
+    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, at_tip, invert=True))
     doubted = Doubted(on_edge, part.q[on_edge], missed, edge > 0.0, plain)
-    if not full:
+    if not all_valid:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack_branches(part, count)

@@ -87,7 +87,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
         return _second_of_pairs(goals, doubted, near_roots, decided)
     i, j, step = i[close], j[close], step[close]
     double = np.abs(step).max(axis=1) < PAIR_DISTANCE
-    inverse, beside = _inverses(goals, q)
+    inverse, beside = _bordered_inverses(goals, q)
     weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
     partners[i[double]], weak[i[double]] = 0, True  # the first root of a double one represents both
     lone = np.flatnonzero(weak & (partners == 0) & decided[k])
@@ -97,14 +97,14 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
         second[k[j[double]], b[j[double]]] = True
         i, j, step = i[~double], j[~double], step[~double]
     if len(i):
-        ends = inverse[j] if not beside.shape[2] else _inverses(goals, q[j], beside[i])[0]
-        alone, meet = _cubic(step, inverse[i], ends)
+        ends = inverse[j] if not beside.shape[2] else _bordered_inverses(goals, q[j], beside[i])[0]
+        alone, meet = _decide_by_cubic(step, inverse[i], ends)
         decided[k[i[~(alone | meet)]]] = False
         second[k[j[meet]], b[j[meet]]] = True
     return second
 
 
-def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
+def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
     """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled`.
 
     A Jacobian with one row more than columns is completed by a column `beside` (M, rows, 1), by default the direction
@@ -119,19 +119,20 @@ def _inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Arra
         return newton.nudged(np.linalg.inv, J), np.empty((M, rows, 0))
     if beside is None:
         any_direction = np.broadcast_to(np.sqrt(np.arange(1.0, rows + 1))[:, None], (M, rows, 1))
-        beside = _unit(newton.nudged(np.linalg.inv, np.concatenate([J, any_direction], axis=2))[:, n:]).swapaxes(1, 2)
+        inverse = newton.nudged(np.linalg.inv, np.concatenate([J, any_direction], axis=2))
+        beside = _unit_rows(inverse[:, n:]).swapaxes(1, 2)
     return newton.nudged(np.linalg.inv, np.concatenate([J, beside], axis=2)), beside
 
 
-def _cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
+def _decide_by_cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
     """Which of P pairs with differences `way` (P, n) stand alone, and which meet, (P,), by inverses of their Jacobians.
 
     The residual g along u is 0 at both ends; its slope on a curve that keeps all other numbers of the target is
     1 / (v' J^-1 u).
     """
     d = np.sqrt((way * way).sum(axis=1))
-    v = _tangents(way / np.maximum(d, PAIR_DISTANCE)[:, None], first)
-    u = _unit(v @ first)
+    v = _bordered_rows(way / np.maximum(d, PAIR_DISTANCE)[:, None], first)
+    u = _unit_rows(v @ first)
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, lost_second = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
         rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
@@ -156,11 +157,11 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
     joint_rows = inverse[:, :n]
     largest = (joint_rows * joint_rows).sum(axis=1).argmax(axis=1)
     v = np.take_along_axis(joint_rows, largest[:, None, None], axis=2)
-    v = _unit((joint_rows @ (joint_rows.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
+    v = _unit_rows((joint_rows @ (joint_rows.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
     way = tol.FOLD_WAY * v * radian_or_reach(goals.arm)
-    ends, _ = _inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
-    v = _tangents(v, inverse)
-    u = _unit(v @ inverse)
+    ends, _ = _bordered_inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
+    v = _bordered_rows(v, inverse)
+    u = _unit_rows(v @ inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
         lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
         slope = 1.0 / (v @ lost)[:, 0, 0]
@@ -175,14 +176,14 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
     return np.asarray(one & (passed < tol.FOLD_WAY) & sharp), np.asarray(one & (end < tol.FOLD_WAY) & level & square)
 
 
-def _tangents(v: Array, inverse: Array) -> Array:
+def _bordered_rows(v: Array, inverse: Array) -> Array:
     """Directions of joints (M, n) as rows (M, 1, rows), with 0 for the column beside the joints."""
     rows = np.zeros((len(v), 1, inverse.shape[1]))
     rows[:, 0, : v.shape[1]] = v
     return rows
 
 
-def _unit(rows: Array) -> Array:
+def _unit_rows(rows: Array) -> Array:
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray(rows / np.sqrt((rows * rows).sum(axis=2, keepdims=True)))
 

@@ -109,9 +109,9 @@ class OneTarget:
         at_near = distance <= self._room
         if not at_near and distance <= self._coarse and all(abs(x - round(x)) <= ROUNDED for x in goal[:9]):
             return None  # `near` may solve it within a rounding that only its position shows
-        return self._found(own_target, near, values, solving, defect, at_near)
+        return self._solution(own_target, near, values, solving, defect, at_near)
 
-    def _beside(self, near: list[float], legal: list[float], solving: list[int]) -> int | None:
+    def _branch_at_near(self, near: list[float], legal: list[float], solving: list[int]) -> int | None:
         """Which of the solving branches, at their nearest legal copies, is at `near`; None if none is."""
         for place, b in enumerate(solving):
             ways = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
@@ -119,7 +119,7 @@ class OneTarget:
                 return place
         return None
 
-    def _found(
+    def _solution(
         self, target: Array, near: Array, values: Sequence[Any], solving: list[int], defect: float, at_near: bool
     ) -> Solutions | None:
         """The solving branches at their nearest legal copies, nan behind them; None if `near` may be another branch.
@@ -144,7 +144,7 @@ class OneTarget:
         within = [True] * count if all(inside) else [all(self._rows[b](inside)) for b in solving]
         limits = zip(near_numbers, self._joints, strict=True)
         if at_near and all(low - SLACK <= v <= high + SLACK for v, (low, high, _) in limits):
-            near_branch = self._beside(near_numbers, legal, solving)
+            near_branch = self._branch_at_near(near_numbers, legal, solving)
             if near_branch is None:
                 return None
             q[near_branch], within[near_branch] = near, True

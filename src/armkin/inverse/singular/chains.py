@@ -39,8 +39,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     Components on which the residual grows, and those that leave a shortened span, are followed both ways until they
     end or close; the latter at most as far as tells that they are manifolds.
     """
-    postures = np.arange(len(q))
-    in_chains = members(at, postures, newton.difference(arm, peers, q[:, None]))
+    in_chains = members(at, np.arange(len(q)), newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
     joints, uncrossed = at.joints.copy(), at.uncrossed.copy()

@@ -36,10 +36,10 @@ class Step(NamedTuple):
 
     def passes(self, arm: Arm, posture: Array, place: Int) -> Bool:
         """Which postures (P, n) the place-th of these steps pass: (P,)."""
-        way, chord = newton.difference(arm, posture, self.start[place]), self.chord[place]
-        size = (chord * chord).sum(axis=1)
-        part = np.clip((way * chord).sum(axis=1) / np.maximum(size, tol.TINY), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(way - part[:, None] * chord, axis=1) < PASSED * np.sqrt(size))
+        offset, chord = newton.difference(arm, posture, self.start[place]), self.chord[place]
+        chord_squared = (chord * chord).sum(axis=1)
+        share = np.clip((offset * chord).sum(axis=1) / np.maximum(chord_squared, tol.TINY), 0.0, 1.0)
+        return np.asarray(np.linalg.norm(offset - share[:, None] * chord, axis=1) < PASSED * np.sqrt(chord_squared))
 
 
 class Curves:
@@ -60,22 +60,22 @@ class Curves:
         """One step of all that are going; one that leads off its curve is not taken, and the next is half as long."""
         rows = np.flatnonzero(self.going)
         arm, joints = self._arm, self._joints[rows]
-        last, pace = self._ahead[rows], self._pace[rows]
-        start = self.at[rows] + pace[:, None] * last * radian_or_reach(arm)
+        last_direction, pace = self._ahead[rows], self._pace[rows]
+        start = self.at[rows] + pace[:, None] * last_direction * radian_or_reach(arm)
         landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
-        ahead = _next_directions(V, second, last)
-        cosine = np.linalg.norm(ahead, axis=1)
+        direction = _next_directions(V, second, last_direction)
+        cosine = np.linalg.norm(direction, axis=1)
         good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
-        before = self.at[rows]
-        self.at[rows[good]], self._ahead[rows[good]] = landed[good], ahead[good] / cosine[good, None]
+        last_q = self.at[rows]
+        self.at[rows[good]], self._ahead[rows[good]] = landed[good], direction[good] / cosine[good, None]
         self._pace[rows] = pace = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * pace)
         self._taken[rows] += 1
-        stuck, long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MAX_STEPS
-        unsure = (second < tol.CROSSING) | (stuck & (size < tol.OFF_CURVE)) | long
-        step = Step(rows, before, newton.difference(arm, self.at[rows], before), np.asarray(unsure))
-        home = step.passes(arm, self._start[rows], np.arange(len(rows)))
-        self.closed[rows] = home & good & (self._taken[rows] > 2)
-        self.going[rows] = ~(self.closed[rows] | stuck | long)
+        is_stuck, is_long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MAX_STEPS
+        unsure = (second < tol.CROSSING) | (is_stuck & (size < tol.OFF_CURVE)) | is_long
+        step = Step(rows, last_q, newton.difference(arm, self.at[rows], last_q), np.asarray(unsure))
+        at_start = step.passes(arm, self._start[rows], np.arange(len(rows)))
+        self.closed[rows] = at_start & good & (self._taken[rows] > 2)
+        self.going[rows] = ~(self.closed[rows] | is_stuck | is_long)
         return step
 
 
@@ -84,12 +84,12 @@ def _longest_steps(second: Array) -> Array:
     return np.asarray(np.where(second < tol.CROSSING, CROSSING_STEP, np.minimum(STEP, BEND * second)))
 
 
-def _next_directions(V: Array, second: Array, last: Array) -> Array:
-    """What is lost of the directions last (M, n), those of steps: V (M, n, n) the smallest singular value's first."""
-    along = np.einsum("mij,mi->mj", V, last)
-    along[:, 2:] = 0.0
-    along[second >= tol.CROSSING, 1] = 0.0
-    return np.asarray(np.einsum("mij,mj->mi", V, along))
+def _next_directions(V: Array, second: Array, directions: Array) -> Array:
+    """What is lost of the directions (M, n) of steps: V (M, n, n) the smallest singular value's first."""
+    components = np.einsum("mij,mi->mj", V, directions)
+    components[:, 2:] = 0.0
+    components[second >= tol.CROSSING, 1] = 0.0
+    return np.asarray(np.einsum("mij,mj->mi", V, components))
 
 
 def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
@@ -103,9 +103,9 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
     L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
     gain = np.where(L > tol.ACROSS, 1.0 / np.maximum(L, tol.ACROSS), 0.0)
     gain[:, 0] = 0.0
-    back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
+    pull_back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
-        q = q + (back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
+        q = q + (pull_back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
         r = newton.residuals(arm, task, q, target)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))
 
@@ -118,24 +118,24 @@ def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array,
     move. The curve is walked both ways at once until it closes. Where another curve crosses it, or it is too long, all
     count as on it.
     """
-    same = np.ones(compared.shape, bool)
+    on_circuit = np.ones(compared.shape, bool)
     if task.orientation == "full":
         is_linkage, joint = four_bars.dead_points(arm, q, joints)
         k, c = np.nonzero(compared & is_linkage[:, None] & (joint >= 0)[:, None])
         pair = np.concatenate([q[k], postures[k, c]])
         side = four_bars.sides(arm, pair, np.tile(joints[k], (2, 1)), np.tile(joint[k], 2)).reshape(2, -1)
-        same[k, c] = side[0] == side[1]
+        on_circuit[k, c] = side[0] == side[1]
         compared = compared & ~is_linkage[:, None]
     curve, column = np.nonzero(compared)
     _, V, second, _ = _onto_curve(arm, task, q, joints, target)
-    ahead, met = V[:, :, 0], np.asarray(second < tol.CROSSING)[curve]
-    if len(open_ := np.flatnonzero(~met)):
-        rows, place = np.unique(curve[open_], return_inverse=True)
-        twice = np.tile(rows, 2)
-        walk = Curves(arm, task, q[twice], joints[twice], target[twice], np.concatenate([ahead[rows], -ahead[rows]]))
-        met[open_] = _met_postures(arm, walk, place, postures[curve, column][open_])
-    same[curve, column] = met
-    return same
+    direction, met = V[:, :, 0], np.asarray(second < tol.CROSSING)[curve]
+    if len(walked := np.flatnonzero(~met)):
+        rows, place = np.unique(curve[walked], return_inverse=True)
+        twin, directions = np.tile(rows, 2), np.concatenate([direction[rows], -direction[rows]])
+        walk = Curves(arm, task, q[twin], joints[twin], target[twin], directions)
+        met[walked] = _met_postures(arm, walk, place, postures[curve, column][walked])
+    on_circuit[curve, column] = met
+    return on_circuit
 
 
 def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
@@ -144,14 +144,14 @@ def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
     The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.
     """
     M, P = len(walk.at) // 2, len(curve)
-    ways, met = np.concatenate([curve, curve + M]), np.zeros(2 * P, bool)
+    curve_way, met = np.concatenate([curve, curve + M]), np.zeros(2 * P, bool)
     while walk.going.any():
         step = walk.step()
         unsure = np.zeros(2 * M, bool)
         unsure[step.rows] = step.unsure
-        unmet = np.flatnonzero(~met & np.isin(ways, step.rows))
-        way = ways[unmet]
-        met[unmet] = step.passes(arm, posture[unmet % P], np.searchsorted(step.rows, way)) | unsure[way]
-        left = np.bincount(curve[~(met[:P] | met[P:])], minlength=M) > 0
-        walk.going &= np.concatenate([left, left & ~walk.closed[:M]])
+        unmet = np.flatnonzero(~met & np.isin(curve_way, step.rows))
+        row = curve_way[unmet]
+        met[unmet] = step.passes(arm, posture[unmet % P], np.searchsorted(step.rows, row)) | unsure[row]
+        has_unmet = np.bincount(curve[~(met[:P] | met[P:])], minlength=M) > 0
+        walk.going &= np.concatenate([has_unmet, has_unmet & ~walk.closed[:M]])
     return np.asarray(met[:P] | (met[P:] & ~walk.closed[curve]))

@@ -20,21 +20,21 @@ BESIDE_SHARE = 0.1  # share of the distance of two roots, up to which a posture 
 ROOT = 0.03  # share of that distance: the next Newton step of an exact root is shorter, beside one of order 16 longer
 
 
-def solves_between(arm: Arm, task: Task, q: Array, way: Array, miss: Array, sigma: Array, target: Array) -> Bool:
-    """Whether a posture between q (M, n) and q + way (M, n), in scaled units, solves the target: (M,).
+def solves_between(arm: Arm, task: Task, q: Array, offset: Array, miss: Array, sigma: Array, target: Array) -> Bool:
+    """Whether a posture between q (M, n) and q + offset (M, n), in scaled units, solves the target: (M,).
 
     miss, sigma: (M,) residual and smallest singular value of the one whose Newton step, their quotient, is longer.
     Beside the posture half way is looked only where this one is no exact root: isolated roots have none in between.
     Steps back onto the curve leave out directions weaker than `HIGH`.
     """
-    halfway = q + 0.5 * way * radian_or_reach(arm)
+    halfway = q + 0.5 * offset * radian_or_reach(arm)
     solves = newton.misses(arm, task, halfway, target) <= tol.SOLUTION
-    far = np.abs(way).max(axis=1)
-    doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH) & (miss > ROOT * far * sigma))
+    distance = np.abs(offset).max(axis=1)
+    doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH) & (miss > ROOT * distance * sigma))
     if len(doubtful):
-        third, size = newton.correct(arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH)
-        moved = np.abs(newton.difference(arm, third, halfway[doubtful])).max(axis=1)
-        solves[doubtful] = (moved < BESIDE_SHARE * far[doubtful]) & (size <= tol.SOLUTION)
+        beside, beside_miss = newton.correct(arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH)
+        moved = np.abs(newton.difference(arm, beside, halfway[doubtful])).max(axis=1)
+        solves[doubtful] = (moved < BESIDE_SHARE * distance[doubtful]) & (beside_miss <= tol.SOLUTION)
     return np.asarray(solves)
 
 
@@ -45,27 +45,27 @@ def equal_candidates(
 
     Those that rounding explains, and those between which and it the posture in the middle solves the target.
     """
-    away = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
-    same = away < _radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-    row, column = np.nonzero(~same & (away < tol.CLOSE_BY))
+    distance = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
+    alike = distance < _rounding_radius(np.minimum(sigma[k], sigma[k, b][:, None]))
+    row, column = np.nonzero(~alike & (distance < tol.CLOSE_BY))
     if len(row):
         start = q[k[row], b[row]]
-        way = newton.difference(arm, q[k[row], column], start)
+        offset = newton.difference(arm, q[k[row], column], start)
         # the longer Newton step of each pair; where it is rounding alone the quotient says nothing
         first, second = (k[row], b[row]), (k[row], column)
         longer = size[second] * sigma[first] > size[first] * sigma[second]
         miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))
-        further = solves_between(arm, task, start, way, miss, weakest, target[k[row]])
-        same[row, column] = further
-        for i in np.unique(row[further]):  # rounding alone parts others from these, which are one with them, too
-            postures, members = q[k[i]], np.flatnonzero(same[i])
-            apart = newton.wrapped_distance(arm, postures[:, None], postures[members])
-            close = apart < _radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], members]))
-            same[i] |= close.any(axis=1)
-    return np.asarray(same), away
+        solves = solves_between(arm, task, start, offset, miss, weakest, target[k[row]])
+        alike[row, column] = solves
+        for i in np.unique(row[solves]):  # rounding alone parts others from these, which are one with them, too
+            postures, equals = q[k[i]], np.flatnonzero(alike[i])
+            distances = newton.wrapped_distance(arm, postures[:, None], postures[equals])
+            close = distances < _rounding_radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], equals]))
+            alike[i] |= close.any(axis=1)
+    return np.asarray(alike), distance
 
 
-def _radius(sigma: Array) -> Array:
+def _rounding_radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
     return np.asarray(tol.SAME + np.minimum(tol.ERROR / np.maximum(sigma, tol.TINY), tol.DOUBLE_ROOT))
 
@@ -84,10 +84,10 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     ends = np.concatenate([q + way, q - way])
     goals = np.concatenate([target, target])
-    ahead, behind = np.split(newton.residuals(arm, task, ends, goals), 2)
-    bend = (u * (ahead + behind - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
-    lost = (u * r).sum(axis=1)
-    remainder = np.linalg.norm(r - lost[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
-    fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
-    beyond = (lost * bend > 0.0) & (np.abs(lost) > 10.0 * tol.SOLUTION)
-    return np.asarray(fold & beyond & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(lost)))
+    forward, backward = np.split(newton.residuals(arm, task, ends, goals), 2)
+    bend = (u * (forward + backward - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
+    along_u = (u * r).sum(axis=1)
+    remainder = np.linalg.norm(r - along_u[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
+    is_fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
+    has_no_root = (along_u * bend > 0.0) & (np.abs(along_u) > 10.0 * tol.SOLUTION)
+    return np.asarray(is_fold & has_no_root & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(along_u)))

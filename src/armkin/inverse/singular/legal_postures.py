@@ -46,9 +46,9 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
         # it must be as exact as what was listed, with a margin, as it is to count as a branch
         if miss > (0.9 * tol.SOLUTION if at_limit else min(max(2.0 * min(listed), tol.ACCEPTED), 0.9 * tol.SOLUTION)):
             continue
-        beside = Goals(arm, task, target[k : k + 1], legal[None])
+        subset = Goals(arm, task, target[k : k + 1], legal[None])
         label = batch.branch[k, batch.valid[k]].astype(np.int64)
-        decision = surfaces.list_swept(beside, components.examine(beside, Seeds.of(q[None], label), surfaces.no_more))
+        decision = surfaces.list_swept(subset, components.examine(subset, Seeds.of(q[None], label), surfaces.no_more))
         _, inside = nearest_row(arm, np.nan_to_num(decision.q[0]), near[k])
         if not (inside & decision.valid[0]).any():
             continue
@@ -61,8 +61,8 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
 
 def _at_limits(arm: Arm, q: Array) -> Bool:
     """Which joints of postures (..., n) are within limits or at one."""
-    beyond = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-    return np.asarray(beyond < tol.SAME)
+    excess = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
+    return np.asarray(excess < tol.SAME)
 
 
 def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
@@ -71,12 +71,12 @@ def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
     k, b = np.nonzero(batch.valid[rows])
     inside = _at_limits(arm, batch.q[rows[k], b])
     # otherwise a held joint is outside its limits, or the curve is less exact than the branches
-    open_ = np.flatnonzero((inside | batch.free[rows[k]]).all(axis=1))
+    undecided = np.flatnonzero((inside | batch.free[rows[k]]).all(axis=1))
     legal: Bool = np.asarray(inside.all(axis=1))
-    open_ = open_[~legal[open_]]
-    if len(open_):
-        sigma, *_ = newton.null_space(arm, task, batch.q[rows[k[open_]], b[open_]], target[rows[k[open_]]])
-        legal[open_] = sigma < tol.CLOSED
+    undecided = undecided[~legal[undecided]]
+    if len(undecided):
+        sigma, *_ = newton.null_space(arm, task, batch.q[rows[k[undecided]], b[undecided]], target[rows[k[undecided]]])
+        legal[undecided] = sigma < tol.CLOSED
     return np.bincount(k[legal], minlength=len(rows)) > 0
 
 
@@ -85,15 +85,15 @@ def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     its self-motion that is neither, if there is one to 0.1 degrees.
     """
     arm, task, target, near = goals
-    good = hits_nothing(arm, batch.q) & batch.within
-    for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~good):
-        on_it = follow_self_motion(arm, task, batch.q[k, b], target[k])
-        rows, inside = nearest_row(arm, on_it, near[k])
-        free = np.flatnonzero(inside)
-        free = free[hits_nothing(arm, rows[free])]
-        if len(free):
+    is_free = hits_nothing(arm, batch.q) & batch.within
+    for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~is_free):
+        postures = follow_self_motion(arm, task, batch.q[k, b], target[k])
+        rows, inside = nearest_row(arm, postures, near[k])
+        candidates = np.flatnonzero(inside)
+        candidates = candidates[hits_nothing(arm, rows[candidates])]
+        if len(candidates):
             unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
-            nearest = free[np.argmin((np.abs(rows[free] - near[k]) * unit).sum(axis=1))]
+            nearest = candidates[np.argmin((np.abs(rows[candidates] - near[k]) * unit).sum(axis=1))]
             batch.q[k, b], batch.within[k, b] = rows[nearest], True
     return batch
 
@@ -105,11 +105,11 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     """
     unit = radian_or_reach(arm)
     _, V, nullity = newton.null_space(arm, task, q[None], target[None])
-    lost = V[0, arm.n - max(int(nullity[0]), 1) :]
-    ahead = np.concatenate([lost, -lost])
-    goal = np.repeat(target[None], len(ahead), axis=0)
-    walk = Curves(arm, task, np.tile(q, (len(ahead), 1)), np.ones(ahead.shape, bool), goal, ahead)
-    pieces = [np.empty((0, arm.n))]
+    null_vectors = V[0, arm.n - max(int(nullity[0]), 1) :]
+    directions = np.concatenate([null_vectors, -null_vectors])
+    goal = np.repeat(target[None], len(directions), axis=0)
+    walk = Curves(arm, task, np.tile(q, (len(directions), 1)), np.ones(directions.shape, bool), goal, directions)
+    stretches = [np.empty((0, arm.n))]
     while walk.going.any():
         step = walk.step()
         count = max(int(np.ceil(np.abs(step.chord).max() / FINE_STEP)), 1)
@@ -117,7 +117,7 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         between = (step.start + share * step.chord * unit).reshape(-1, arm.n)
         goal = np.repeat(target[None], len(between), axis=0)
         landed, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
-        good = size <= tol.SOLUTION
-        pieces.append(landed[good])
-        walk.going[step.rows] &= good.reshape(count, -1).all(axis=0)  # what else is near is no part of it
-    return np.concatenate(pieces)
+        on_target = size <= tol.SOLUTION
+        stretches.append(landed[on_target])
+        walk.going[step.rows] &= on_target.reshape(count, -1).all(axis=0)  # what else is near is no part of it
+    return np.concatenate(stretches)

@@ -49,14 +49,14 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     arm, task, target, near = goals
     K, S, B, n = q.shape
     tried = ~np.isnan(q[..., 0]) & loose[:, None]
-    size = np.full(tried.shape, np.inf)
-    size[tried] = newton.misses(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
-    solving, near_miss = size < tol.CLOSED, newton.misses(arm, task, near, target)
-    decided, motions = _motions(goals, q, solving, loose)
+    miss = np.full(tried.shape, np.inf)
+    miss[tried] = newton.misses(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
+    solving, near_miss = miss < tol.CLOSED, newton.misses(arm, task, near, target)
+    decided, motions = _find_motions(goals, q, solving, loose)
     lacking = np.asarray((loose & (solving.sum(axis=1) < 2)).any(axis=1))
     decided &= ~lacking & ~((near_miss > tol.CLOSED) & (near_miss <= tol.SOLUTION))
-    leader, apart = _first_columns(arm, motions, loose)
-    decided &= apart
+    leader, is_apart = _first_columns(arm, motions, loose)
+    decided &= is_apart
     circuit = np.zeros((K, S, B), bool)
     k, s, b = np.nonzero(solving & decided[:, None, None] & (motions.joint >= 0)[:, None])
     if len(k):
@@ -65,14 +65,15 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     key = np.where(solving, 2 * leader[:, None] + circuit, 2 * B).reshape(K, -1)
     # a self-motion of two circuits may have candidates on one of them alone
     on_circuit = (key[:, :, None] == np.arange(2 * B)).any(axis=1).reshape(-1, B, 2)
-    half = decided & ((motions.joint >= 0) & (on_circuit.sum(axis=2) == 1)).any(axis=1)
-    decided &= ~half
+    lacks_circuit = decided & ((motions.joint >= 0) & (on_circuit.sum(axis=2) == 1)).any(axis=1)
+    decided &= ~lacks_circuit
     # each circuit's posture with the least motion is listed
     q = q.reshape(K, S * B, n).copy()
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     order = np.lexsort((motion, key))
-    first, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
-    np.put_along_axis(listed, order, first, axis=1)
+    leads = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0
+    listed = np.zeros(key.shape, bool)
+    np.put_along_axis(listed, order, leads, axis=1)
     listed &= key < 2 * B
     if (stands := decided & (near_miss <= tol.CLOSED)).any():
         decided &= _listed_as_near(goals, q, listed, key, motions, leader, loose, stands)
@@ -80,20 +81,20 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     listed &= decided[:, None]
     q[~listed] = np.nan
     joints = listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
-    return Linkages(decided, lacking | half, q, joints)
+    return Linkages(decided, lacking | lacks_circuit, q, joints)
 
 
-def _motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, _Motions]:
+def _find_motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, _Motions]:
     """What the loose candidates solving (K, S, B) their targets move on; known: (K,) if it is all known."""
     arm, task, target, _ = goals
     base = np.take_along_axis(q, solving.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
     moved = np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME
     moving: Bool = np.asarray((moved & solving[..., None]).any(axis=1))
-    way = newton.difference(arm, q[:, 1], q[:, 0])
-    even = ((np.abs(np.abs(way) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
+    step = newton.difference(arm, q[:, 1], q[:, 0])
+    same_pace = ((np.abs(np.abs(step) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
-    line: Bool = np.asarray(loose & solving[:, 0] & solving[:, 1] & even & (count == 2) & (last - first == 2))
-    d = np.where(line[:, :, None], np.where(moving, np.sign(way), 0.0), moving)
+    line: Bool = np.asarray(loose & solving[:, 0] & solving[:, 1] & same_pace & (count == 2) & (last - first == 2))
+    d = np.where(line[:, :, None], np.where(moving, np.sign(step), 0.0), moving)
     k, b = np.nonzero(line)
     if len(k):
         places = (q[k, 0, b][:, None] + PLACES * d[k, b][:, None]).reshape(-1, arm.n)
@@ -109,27 +110,27 @@ def _motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, 
 
 def _held_difference(arm: Arm, a: Array, b: Array, d: Array, line: Bool) -> Array:
     """How far postures (..., n) differ besides a way along self-motions d (..., n), lines or four bars: (...)."""
-    way = newton.difference(arm, a, b)
-    held = np.abs(np.where(d != 0.0, 0.0, way)).max(axis=-1)
+    offset = newton.difference(arm, a, b)
+    held_offset = np.abs(np.where(d != 0.0, 0.0, offset)).max(axis=-1)
     if line.any():
         # along a line one joint turns back what the other turns: what is left of both turns is no way along it
         first = (np.cumsum(np.abs(d), axis=-1) == 1.0) & (d != 0.0)
-        left = np.abs(wrap_angle(np.where(first, d * way, -d * way).sum(axis=-1)))
-        held = np.where(line, np.maximum(held, left), held)
-    return np.asarray(held)
+        turn_difference = np.abs(wrap_angle(np.where(first, d * offset, -d * offset).sum(axis=-1)))
+        held_offset = np.where(line, np.maximum(held_offset, turn_difference), held_offset)
+    return np.asarray(held_offset)
 
 
 def _first_columns(arm: Arm, motions: _Motions, loose: Bool) -> tuple[Int, Bool]:
     """The first column (K, B) on the same self-motion as each; and whether all others are clearly apart (K,)."""
     B, base, d = loose.shape[1], motions.base, motions.d[:, :, None]
-    held = _held_difference(arm, base[:, None], base[:, :, None], d, motions.line[:, :, None])  # (K, B, B)
+    held_offset = _held_difference(arm, base[:, None], base[:, :, None], d, motions.line[:, :, None])  # (K, B, B)
     alike = ((d != 0.0) == (motions.d[:, None] != 0.0)).all(axis=3)
     sense = motions.d.prod(axis=2, where=motions.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
     pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)
-    same = pair & alike & (held < tol.TURNED)
-    apart = ~(pair & ~same & ~(held > tol.APART_ROOTS)).any(axis=(1, 2))
-    return np.where(same, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(apart)
+    shared = pair & alike & (held_offset < tol.TURNED)
+    is_apart = ~(pair & ~shared & ~(held_offset > tol.APART_ROOTS)).any(axis=(1, 2))
+    return np.where(shared, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(is_apart)
 
 
 def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
@@ -140,8 +141,8 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
             break
         row, column = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
         _, J = newton.scaled(goals.arm, goals.task, q[k[row], column], goals.target[k[row]])
-        fine = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLDED], minlength=len(k)) > 0
-        k, m, listed = k[~fine], m[~fine], np.ones_like(listed)
+        is_regular = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLDED], minlength=len(k)) > 0
+        k, m, listed = k[~is_regular], m[~is_regular], np.ones_like(listed)
     regular = np.ones(len(q), bool)
     regular[k] = False
     return regular
@@ -157,14 +158,14 @@ def _listed_as_near(
     arm, _, _, near = goals
     k = np.flatnonzero(stands)
     decided = np.ones(len(q), bool)
-    held = _held_difference(arm, near[k, None], motions.base[k], motions.d[k], motions.line[k])
-    held = np.where(loose[k], held, np.inf)
-    b, least = held.argmin(axis=1), held.min(axis=1)
-    decided[k[(least >= tol.TURNED) & (least < tol.APART_ROOTS)]] = False
-    k, b = k[least < tol.TURNED], b[least < tol.TURNED]
-    mine = 2 * leader[k, b]
-    if len(two := np.flatnonzero(motions.joint[k, b] >= 0)):
-        mine[two] += four_bars.sides(arm, near[k[two]], motions.d[k[two], b[two]] != 0.0, motions.joint[k[two], b[two]])
-    row, m = np.nonzero(listed[k] & (key[k] == mine[:, None]))
+    held_offset = _held_difference(arm, near[k, None], motions.base[k], motions.d[k], motions.line[k])
+    held_offset = np.where(loose[k], held_offset, np.inf)
+    b, least_offset = held_offset.argmin(axis=1), held_offset.min(axis=1)
+    decided[k[(least_offset >= tol.TURNED) & (least_offset < tol.APART_ROOTS)]] = False
+    k, b = k[least_offset < tol.TURNED], b[least_offset < tol.TURNED]
+    own_key = 2 * leader[k, b]
+    if len(p := np.flatnonzero(motions.joint[k, b] >= 0)):
+        own_key[p] += four_bars.sides(arm, near[k[p]], motions.d[k[p], b[p]] != 0.0, motions.joint[k[p], b[p]])
+    row, m = np.nonzero(listed[k] & (key[k] == own_key[:, None]))
     q[k[row], m] = near[k[row]]
     return decided

@@ -88,7 +88,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
     linear: the residuals there and the Jacobians' singular values, if they are known.
     """
     linear = linear or newton.Linear.linearise(arm, task, q, target)
-    curve, rows = _unfollowed(linear), linear.r.shape[1]
+    curve, rows = _blank_structure(linear), linear.r.shape[1]
     n, w = q.shape[1], np.zeros(q.shape)
     if rows < n:
         return curve
@@ -118,14 +118,14 @@ def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array, heading:
     """The curves through postures (M, n), the way that heading (M, n) points, as far as span (M,)."""
     linear = newton.Linear.linearise(arm, task, q, target)
     linear.V[(linear.V[:, -1] * heading).sum(axis=1) < 0.0, -1] *= -1.0
-    curve = _unfollowed(linear)
+    curve = _blank_structure(linear)
     curve.span[...] = span
     starts = _Start(q, target, linear.U[:, :, arm.n - 1 :], linear.V[:, -1], np.zeros(q.shape), curve.span)
     _follow_spans(arm, task, starts, curve, np.arange(len(q)), ONE_WAY)
     return curve
 
 
-def _unfollowed(linear: newton.Linear) -> Structure:
+def _blank_structure(linear: newton.Linear) -> Structure:
     """What the Jacobians tell: the lost direction, and the longest span."""
     r, _, S, V = linear
     M, n = len(r), V.shape[2]
@@ -145,7 +145,7 @@ def leave_spans(arm: Arm, structure: Structure, rows: Int, q: Array, heading: Ar
     """
     sense = np.sign((structure.v[rows] * heading).sum(axis=1))
     end = np.where(sense > 0.0, structure.high[rows], -structure.low[rows])
-    x = _values(structure.x[:, rows], np.multiply.outer([0.9, 1.0], sense))
+    x = _evaluate(structure.x[:, rows], np.multiply.outer([0.9, 1.0], sense))
     leaves = (end >= structure.span[rows])[:, None]
     return np.where(leaves, q + x[1] * radian_or_reach(arm), np.nan), x[1] - x[0]
 
@@ -153,7 +153,7 @@ def leave_spans(arm: Arm, structure: Structure, rows: Int, q: Array, heading: Ar
 def _follow_spans(arm: Arm, task: Task, starts: _Start, curve: Structure, rows: Int, side: Side) -> Bool:
     """Follow the curves of some postures along their spans; write to `curve` what those tell that stay at hand (m,)."""
     start, span = rows_of(starts, rows), curve.span[rows]
-    holds, span_ratio, uncrossed, x, g = _polynomials(arm, task, start, side)
+    holds, span_ratio, uncrossed, x, g = _fit_polynomials(arm, task, start, side)
     # Newton's method may have found another curve close by: then x(0) is not the posture
     slack = tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
     holds &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + slack)
@@ -220,11 +220,11 @@ def _second_order(arm: Arm, task: Task, q: Array, target: Array, linear: newton.
     return np.asarray(w)
 
 
-def _polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Bool, Array, Array]:
+def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Bool, Array, Array]:
     """Which curves (M,) stay at hand as far as their spans, how many times as long spans they may (M,), on which of
     these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k)."""
     n, rows, span = start.q.shape[1], start.u.shape[1], start.span
-    holds, x, along_u, inverse = _nodes(arm, task, start, side)
+    holds, x, along_u, inverse = _solve_nodes(arm, task, start, side)
     # along the curve u turns: the inverse's last rows span what no motion across v reaches there
     g = _least_residual(inverse[:, :, n:, :rows], along_u)
     values = np.concatenate([x, g], axis=2)
@@ -242,8 +242,8 @@ def _polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
     return np.asarray(holds), span_ratio, uncrossed, power[:, :, :n], power[:, :, n:]
 
 
-def _nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Array, Array]:
-    """Nodes of the curves of `_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
+def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Array, Array]:
+    """Nodes of the curves of `_fit_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
     the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
 
     Each is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems,
@@ -310,7 +310,7 @@ ONE_WAY = Side(0.5 * (NODE + 1.0), _SHIFT.T @ _POWERS @ _FIT, 0.0, 1.0)
 TO_LAST = _FIT[-2:]
 
 
-def _values(coefficients: Array, s: Array) -> Array:
+def _evaluate(coefficients: Array, s: Array) -> Array:
     """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
     values, s = np.zeros((*s.shape, coefficients.shape[2])), s[..., None]
     for c in coefficients[::-1]:
@@ -334,7 +334,7 @@ def _ends_of_components(g: Array, side: Side) -> tuple[Array, Bool]:
     low, high = POINTS[np.maximum(point - 1, 0)], POINTS[point]
     for _ in range(2 if len(rows) else 0):
         between = low + FINER_GRID * (high - low)
-        exceeds = np.linalg.norm(_values(g[:, rows], between[1:]), axis=2) > tol.SOLUTION
+        exceeds = np.linalg.norm(_evaluate(g[:, rows], between[1:]), axis=2) > tol.SOLUTION
         exceeds[-1] = True
         point = exceeds.argmax(axis=0)
         low, high = between[point, np.arange(len(rows))], between[point + 1, np.arange(len(rows))]
@@ -348,13 +348,13 @@ def _decide(curve: Structure, rows: Int, side: Side) -> None:
     distance, ended = _ends_of_components(g, side)
     low, high = side.low * distance[0], distance[-1]
     s = low + FINE_GRID * (high - low)  # (points, M)
-    way = _values(x, s)
+    way = _evaluate(x, s)
     curve.least_way[rows], curve.most_way[rows] = way.min(axis=0), way.max(axis=0)
     extent = curve.most_way[rows] - curve.least_way[rows]
     is_long = extent.max(axis=1) >= tol.REACH
     curve.known[rows], curve.manifold[rows] = is_long | ended.all(axis=0), is_long
     if len(short := np.flatnonzero(~is_long)):
-        slope = _values(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
+        slope = _evaluate(g[1:, short] * np.arange(1, NODES)[:, None, None], s[:, short]) / span[short, None]
         place = np.linalg.norm(slope, axis=2).argmax(axis=0)
         steepest = slope[place, np.arange(len(short))]
         along = (slope * steepest).sum(axis=2) / np.maximum(np.linalg.norm(steepest, axis=1), tol.TINY)
@@ -371,7 +371,7 @@ def members(structure: Structure, rows: Int, way: Array) -> Bool:
     """
     t = (way * structure.v[rows, None]).sum(axis=2)  # (m, M)
     span, slack = structure.span[rows], 4.0 * tol.SOLUTION / structure.second[rows]
-    x = _values(structure.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
+    x = _evaluate(structure.x[:, rows], np.clip(t / span[:, None], -1.0, 1.0).T).swapaxes(0, 1)
     offset = np.abs(way - x).max(axis=2)
     in_range = (t >= (structure.low[rows] - slack)[:, None]) & (t <= (structure.high[rows] + slack)[:, None])
     return np.asarray(

@@ -43,51 +43,51 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     b += 1
     weak, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
     rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / tol.HIGH)
-    _, first, same = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
+    _, first, group = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
     most = np.maximum(tol.ACCEPTED, 2.0 * size[row, b[first]])
     meet, ends, rests = _steps_out(arm, task, q[row, b[first]], rows_of(weak, first), nullity[first], target[row], most)
-    size[k, b] = np.where(np.isin(same.reshape(-1), meet), np.inf, size[k, b])
+    size[k, b] = np.where(np.isin(group.reshape(-1), meet), np.inf, size[k, b])
     order = np.argsort(row[meet], kind="stable")
     meet, ends = meet[order], ends[order]
-    whose, row = label[k[first], b[first]][meet], row[meet]
+    label_of_end, row = label[k[first], b[first]][meet], row[meet]
     place = np.arange(len(row)) - np.searchsorted(row, row)
     shape = len(q), int(place.max(initial=-1)) + 1
-    more, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN_LABEL), np.full(shape, np.inf)
-    more[row, place], labels[row, place] = ends, whose
+    added, labels, sizes = np.full((*shape, arm.n), np.nan), np.full(shape, OWN_LABEL), np.full(shape, np.inf)
+    added[row, place], labels[row, place] = ends, label_of_end
     sizes[row, place] = newton.misses(arm, task, ends, target[row])
     resting = np.zeros((len(q), q.shape[1] + shape[1]), bool)
-    resting[k, b] = rests[same.reshape(-1)]
-    return np.concatenate([q, more], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
+    resting[k, b] = rests[group.reshape(-1)]
+    return np.concatenate([q, added], 1), np.concatenate([label, labels], 1), np.concatenate([size, sizes], 1), resting
 
 
 @cache
-def _directions(k: int) -> tuple[Array, Array, float]:
+def _sample_directions(k: int) -> tuple[Array, Array, float]:
     """Directions (P, k) in a plane or in space, their coordinates' products (k (k + 1) / 2, P), and how far [rad] any
     direction is from one of these at most."""
     if k == 2:
-        turn = np.linspace(0.0, np.pi, PLANE_DIRECTIONS, endpoint=False)
-        unit, far = np.stack([np.cos(turn), np.sin(turn)], axis=1), np.pi / PLANE_DIRECTIONS
+        angle = np.linspace(0.0, np.pi, PLANE_DIRECTIONS, endpoint=False)
+        unit, spacing = np.stack([np.cos(angle), np.sin(angle)], axis=1), np.pi / PLANE_DIRECTIONS
     else:
         side = np.linspace(-1.0, 1.0, EDGE_POINTS)
         face = np.stack([*np.meshgrid(side, side), np.ones((EDGE_POINTS, EDGE_POINTS))], axis=2).reshape(-1, 3)
         unit = np.concatenate([np.roll(face, i, axis=1) for i in range(3)])
-        unit, far = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (EDGE_POINTS - 1)
-    return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)]), far
+        unit, spacing = unit / np.linalg.norm(unit, axis=1, keepdims=True), 2.0**0.5 / (EDGE_POINTS - 1)
+    return unit, np.stack([unit[:, i] * unit[:, j] for i, j in combinations_with_replacement(range(k), 2)]), spacing
 
 
-def _sizes(forms: Array, products: Array, far: float) -> tuple[Array, Array]:
+def _form_sizes(forms: Array, products: Array, spacing: float) -> tuple[Array, Array]:
     """Sizes (m, P) of forms (m, k, pairs) in directions of products (pairs, P), and by which none is zero: (m,).
 
     As far [rad] from the next of these directions a form differs by twice its largest value at most.
     """
     values = forms @ products  # (m, k, P)
     size = np.sqrt((values * values).sum(axis=1))
-    return size, ALL_ROUND + 2.0 * far * size.max(axis=1)
+    return size, ALL_ROUND + 2.0 * spacing * size.max(axis=1)
 
 
-def _tangents(
-    arm: Arm, task: Task, q: Array, at: newton.Linear, nullity: Int, target: Array
+def _curve_tangents(
+    arm: Arm, task: Task, q: Array, linear: newton.Linear, nullity: Int, target: Array
 ) -> tuple[Bool, Int, Array]:
     """For which postures (M, n) the directions of curves are known, and these: whose (m,), and which (m, n).
 
@@ -97,68 +97,69 @@ def _tangents(
     none.
     """
     n, decided = arm.n, np.zeros(len(q), bool)
-    whose, ways = [np.zeros(0, np.intp)], [np.zeros((0, n))]
+    meetings, directions = [np.zeros(0, np.intp)], [np.zeros((0, n))]
     for k in (2, 3):
         rows = np.flatnonzero(nullity == k)
-        rows = rows[at.S[rows, n - k - 1] > THIRD] if at.r.shape[1] == n > k else rows[:0]
+        rows = rows[linear.S[rows, n - k - 1] > THIRD] if linear.r.shape[1] == n > k else rows[:0]
         if not len(rows):
             continue
-        unit, products, far = _directions(k)
-        pairs, V = list(combinations_with_replacement(range(k), 2)), at.V[rows, n - k :]
+        unit, products, spacing = _sample_directions(k)
+        pairs, V = list(combinations_with_replacement(range(k), 2)), linear.V[rows, n - k :]
         push = np.stack([V[:, i] if i == j else V[:, i] + V[:, j] for i, j in pairs])
         ends = (q[rows] + np.multiply.outer([tol.FOLD_WAY, -tol.FOLD_WAY], push * radian_or_reach(arm))).reshape(-1, n)
         goal = np.concatenate([target[rows]] * (2 * len(pairs)))
         r = newton.residuals(arm, task, ends, goal).reshape(2, len(pairs), len(rows), n)
-        bent = ((r.sum(axis=0) - 2.0 * at.r[rows])[..., None] * at.U[rows][:, :, n - k :]).sum(axis=2) / tol.FOLD_WAY**2
-        diag = {i: b for b, (i, j) in zip(bent, pairs, strict=True) if i == j}
-        columns = [b if i == j else b - diag[i] - diag[j] for b, (i, j) in zip(bent, pairs, strict=True)]
+        bends = ((r.sum(axis=0) - 2.0 * linear.r[rows])[..., None] * linear.U[rows][:, :, n - k :]).sum(axis=2)
+        bends /= tol.FOLD_WAY**2
+        squares = {i: b for b, (i, j) in zip(bends, pairs, strict=True) if i == j}
+        columns = [b if i == j else b - squares[i] - squares[j] for b, (i, j) in zip(bends, pairs, strict=True)]
         forms = np.stack(columns, axis=2)  # (m, k, pairs)
         if k == 3:
-            for some in (products[:, ::SAMPLE], products):
-                size, least = _sizes(forms, some, far)
-                none = size.min(axis=1) > least
-                rows, forms = rows[none], forms[none]
+            for sample in (products[:, ::SAMPLE], products):
+                size, least = _form_sizes(forms, sample, spacing)
+                all_grow = size.min(axis=1) > least
+                rows, forms = rows[all_grow], forms[all_grow]
             decided[rows] = True
             continue
-        size, least = _sizes(forms, products, far)
+        size, least = _form_sizes(forms, products, spacing)
         decided[rows] = size.max(axis=1) > SPREAD * ALL_ROUND
-        zero = (size <= least[:, None]) & decided[rows, None]
-        zero &= (size <= np.roll(size, 1, axis=1)) & (size < np.roll(size, -1, axis=1))
-        place, row = np.nonzero(zero.T)
-        whose.append(rows[row])
-        ways.append((unit[place][:, :, None] * V[row]).sum(axis=1))
-    return decided, np.concatenate(whose), np.concatenate(ways)
+        is_zero = (size <= least[:, None]) & decided[rows, None]
+        is_zero &= (size <= np.roll(size, 1, axis=1)) & (size < np.roll(size, -1, axis=1))
+        place, row = np.nonzero(is_zero.T)
+        meetings.append(rows[row])
+        directions.append((unit[place][:, :, None] * V[row]).sum(axis=1))
+    return decided, np.concatenate(meetings), np.concatenate(directions)
 
 
 def _steps_out(
-    arm: Arm, task: Task, q: Array, linear: newton.Linear, nullity: Int, target: Array, most: Array
+    arm: Arm, task: Task, q: Array, linear: newton.Linear, nullity: Int, target: Array, limit: Array
 ) -> tuple[Int, Array, Bool]:
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
-    most: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
+    limit: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
     meetings (M,) all pushes end at.
     """
-    decided, meeting, push = _tangents(arm, task, q, linear, nullity, target)
-    rests, open_ = decided.copy(), np.flatnonzero(~decided)
-    surface, row, pushed = on_surface(arm, task, q[open_], linear.V[open_], nullity[open_], target[open_])
-    rests[open_] = ~surface
-    three = np.flatnonzero(rests[open_[row]] & (nullity[open_[row]] > 2))  # pushed all ways they may go
+    decided, meeting, push = _curve_tangents(arm, task, q, linear, nullity, target)
+    rests, unsure = decided.copy(), np.flatnonzero(~decided)
+    surface, row, pushed = on_surface(arm, task, q[unsure], linear.V[unsure], nullity[unsure], target[unsure])
+    rests[unsure] = ~surface
+    searched = np.flatnonzero(rests[unsure[row]] & (nullity[unsure[row]] > 2))  # pushed all ways they may go
     rows = np.flatnonzero(rests & ~decided & (nullity < 3))
     if len(rows):
-        more, further = null_directions(arm.n, linear.V[rows], nullity[rows])
-        meeting, push = np.concatenate([meeting, rows[more]]), np.concatenate([push, further])
-    once = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
-    postures, size, growth = (np.concatenate([a, b[three]]) for a, b in zip(once, pushed, strict=True))
-    meeting = np.concatenate([meeting, open_[row[three]]])
+        more_rows, more_push = null_directions(arm.n, linear.V[rows], nullity[rows])
+        meeting, push = np.concatenate([meeting, rows[more_rows]]), np.concatenate([push, more_push])
+    first_push = push_along(arm, task, q[meeting], np.full(len(meeting), 10 * STEP), push, target[meeting])
+    postures, size, growth = (np.concatenate([a, b[searched]]) for a, b in zip(first_push, pushed, strict=True))
+    meeting = np.concatenate([meeting, unsure[row[searched]]])
     if not len(meeting):
         return meeting, postures, rests
     rests[meeting[growth <= tol.GROWTH]] = False
-    unit, way = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
-    good = np.flatnonzero((size <= most[meeting]) & (np.abs(way).max(axis=1) > 3 * STEP))
-    good = good[newton.null_space(arm, task, postures[good], target[meeting[good]])[2] == 1]
+    unit, offset = radian_or_reach(arm), newton.difference(arm, postures, q[meeting])
+    reached = np.flatnonzero((size <= limit[meeting]) & (np.abs(offset).max(axis=1) > 3 * STEP))
+    reached = reached[newton.null_space(arm, task, postures[reached], target[meeting[reached]])[2] == 1]
     # a posture is on a self-motion through the meeting if the middle of the way is no farther off it than a curve bows
-    start = q[meeting[good]] + 0.5 * way[good] * unit
-    between, size = pull_back(arm, task, start, target[meeting[good]])
-    beside = np.abs(newton.difference(arm, between, start)).max(axis=1)
-    good = good[(size <= tol.SOLUTION) & (beside < BOW * np.abs(way[good]).max(axis=1))]
-    return meeting[good], postures[good], rests
+    start = q[meeting[reached]] + 0.5 * offset[reached] * unit
+    between, size = pull_back(arm, task, start, target[meeting[reached]])
+    deviation = np.abs(newton.difference(arm, between, start)).max(axis=1)
+    reached = reached[(size <= tol.SOLUTION) & (deviation < BOW * np.abs(offset[reached]).max(axis=1))]
+    return meeting[reached], postures[reached], rests

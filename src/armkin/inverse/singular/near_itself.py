@@ -41,23 +41,23 @@ def at_tip(
     x = point[:, 0] if first is None else first
     rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= most)  # one coordinate tells nearly all others
     if len(rows):
-        away = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
-        rows = rows[away.max(axis=1) <= (most if isinstance(most, float) else most[rows])]
+        distance = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
+        rows = rows[distance.max(axis=1) <= (most if isinstance(most, float) else most[rows])]
     return rows
 
 
-def take(goals: Goals, batch: Batch, rows: Int) -> Int:
+def put_near(goals: Goals, batch: Batch, rows: Int) -> Int:
     """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
 
     goals, batch: N targets and their branches; rows: those of `at_tip`. Two are one if the posture between them solves
     the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
     """
-    left = [_take_chunk(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
-    return np.concatenate(left) if left else rows
+    unsure = [_put_near_in_chunk(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
+    return np.concatenate(unsure) if unsure else rows
 
 
-def _take_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
-    """`take` for rows whose branches fit into the cache."""
+def _put_near_in_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
+    """`put_near` for rows whose branches fit into the cache."""
     arm, task = goals.arm, goals.task
     rows = rows[~limits.outside_limits(arm, goals.near[rows]).any(axis=1)]
     if not len(rows):
@@ -65,27 +65,27 @@ def _take_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
     near, target = goals.near[rows], goals.target[rows]
     if not batch.valid.shape[1]:  # an elimination that found nothing at all
         return np.asarray(rows[newton.misses(arm, task, near, target) <= tol.SOLUTION])
-    away = newton.wrapped_distance(arm, batch.q[rows], near[:, None])
-    away = np.where(batch.valid[rows], away, np.inf)
-    place = away.argmin(axis=1)
-    least = away.min(axis=1)
-    stays, solves = least <= tol.THERE, np.ones(len(rows), bool)
-    unsure = np.flatnonzero(~stays)
+    distance = newton.wrapped_distance(arm, batch.q[rows], near[:, None])
+    distance = np.where(batch.valid[rows], distance, np.inf)
+    place = distance.argmin(axis=1)
+    least_distance = distance.min(axis=1)
+    has_branch, solves = least_distance <= tol.THERE, np.ones(len(rows), bool)
+    unsure = np.flatnonzero(~has_branch)
     if len(unsure):
         solves[unsure] = newton.misses(arm, task, near[unsure], target[unsure]) <= tol.SOLUTION
-        unsure = unsure[solves[unsure] & ((away[unsure] < tol.CLOSE_BY).sum(axis=1) == 1)]
-        way = newton.difference(arm, batch.q[rows[unsure], place[unsure]], near[unsure])
-        between = near[unsure] + 0.5 * way * radian_or_reach(arm)
-        stays[unsure] = newton.misses(arm, task, between, target[unsure]) <= tol.SOLUTION
-    batch.q[rows[stays], place[stays]] = near[stays]
-    batch.within[rows[stays], place[stays]] = True
-    return np.asarray(rows[solves & ~stays])
+        unsure = unsure[solves[unsure] & ((distance[unsure] < tol.CLOSE_BY).sum(axis=1) == 1)]
+        offset = newton.difference(arm, batch.q[rows[unsure], place[unsure]], near[unsure])
+        between = near[unsure] + 0.5 * offset * radian_or_reach(arm)
+        has_branch[unsure] = newton.misses(arm, task, between, target[unsure]) <= tol.SOLUTION
+    batch.q[rows[has_branch], place[has_branch]] = near[has_branch]
+    batch.within[rows[has_branch], place[has_branch]] = True
+    return np.asarray(rows[solves & ~has_branch])
 
 
 def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
     """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within most (N,) [reaches, rad].
 
-    Of those that are known better than to `SOLUTION` there are none: of these `take` has decided.
+    Of those that are known better than to `SOLUTION` there are none: of these `put_near` has decided.
     """
     rounded = most > ROUNDED
     if not rounded.any():
@@ -96,7 +96,7 @@ def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, most: Array
     return np.asarray(rows[newton.misses(arm, task, close[rows], target[rows]) <= most[rows]])
 
 
-def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
+def list_near(goals: Goals, batch: Batch, most: Array) -> Batch:
     """The branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
 
     In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
@@ -106,19 +106,20 @@ def stand(goals: Goals, batch: Batch, most: Array) -> Batch:
     rows = solved_by_near(arm, task, target, near, most)
     if not len(rows):
         return batch
-    way = newton.difference(arm, batch.q[rows], near[rows, None])
-    away = np.where(batch.valid[rows], np.abs(way).max(axis=2), np.inf)
-    away = np.pad(away, ((0, 0), (0, 1)), constant_values=np.inf)
-    same, nearest = away <= tol.THERE, away == away.min(axis=1, keepdims=True)
-    for tried, steps in (nearest, 0), (away < np.inf, 0), (away < np.inf, 6):  # in the last the component may bend
-        k, b = np.nonzero(tried & (away < np.inf) & ~same.any(axis=1, keepdims=True))
-        halfway = near[rows[k]] + 0.5 * way[k, b] * radian_or_reach(arm)
-        beside, size = pull_back(arm, task, halfway, target[rows[k]], steps)
-        moved = newton.wrapped_distance(arm, beside, halfway)
-        same[k, b] = (size <= most[rows[k]]) & (moved <= BESIDE_SHARE * away[k, b])
-    place, stays = np.where(same, away, np.inf).argmin(axis=1), same.any(axis=1)
+    offset = newton.difference(arm, batch.q[rows], near[rows, None])
+    distance = np.where(batch.valid[rows], np.abs(offset).max(axis=2), np.inf)
+    distance = np.pad(distance, ((0, 0), (0, 1)), constant_values=np.inf)
+    is_one, is_nearest = distance <= tol.THERE, distance == distance.min(axis=1, keepdims=True)
+    has_q = distance < np.inf
+    for tried, steps in (is_nearest, 0), (has_q, 0), (has_q, 6):  # in the last the component may bend
+        k, b = np.nonzero(tried & has_q & ~is_one.any(axis=1, keepdims=True))
+        halfway = near[rows[k]] + 0.5 * offset[k, b] * radian_or_reach(arm)
+        between, size = pull_back(arm, task, halfway, target[rows[k]], steps)
+        deviation = newton.wrapped_distance(arm, between, halfway)
+        is_one[k, b] = (size <= most[rows[k]]) & (deviation <= BESIDE_SHARE * distance[k, b])
+    place, has_branch = np.where(is_one, distance, np.inf).argmin(axis=1), is_one.any(axis=1)
     count = batch.valid[rows].sum(axis=1)
-    place = np.where(stays, place, count)
+    place = np.where(has_branch, place, count)
     batch = stack_rows([batch, empty_batch(0, int(place.max()) + 1, arm.n)])
     batch.q[rows, place], batch.valid[rows, place], batch.within[rows, place] = near[rows], True, True
     batch.branch[rows] = complete_labels(batch.branch[rows].astype(np.int64), batch.valid[rows])

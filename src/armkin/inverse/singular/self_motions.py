@@ -35,22 +35,22 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
     arm, task, target, _ = goals
     pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
-        mine = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
-        narrow = curve[k, mine].sum(axis=1) <= arm.n // 2
+        moving = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
+        narrow = curve[k, moving].sum(axis=1) <= arm.n // 2
         for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH) & ~curve[k].any(axis=1)):
-            away = np.where(curve[k, mine], 0.0, np.abs(newton.difference(arm, q[k, mine], q[k, i]))).max(axis=1)
-            pairs += [(int(k), int(i), int(j)) for j in mine[(away < tol.CLOSE_BY) & narrow]]
-        mine = mine[sigma[k, mine] < tol.SOLUTION]  # a double root's listed posture may be off it
-        for i in mine[mine > 0]:
-            wider = [j for j in mine if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
+            offset = np.where(curve[k, moving], 0.0, np.abs(newton.difference(arm, q[k, moving], q[k, i]))).max(axis=1)
+            pairs += [(int(k), int(i), int(j)) for j in moving[(offset < tol.CLOSE_BY) & narrow]]
+        moving = moving[sigma[k, moving] < tol.SOLUTION]  # a double root's listed posture may be off it
+        for i in moving[moving > 0]:
+            wider = [j for j in moving if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
-            away = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
-            if len(wider) and (np.where(curve[k, wider], 0.0, away).max(axis=1) < tol.TURNED).any():
+            offset = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
+            if len(wider) and (np.where(curve[k, wider], 0.0, offset).max(axis=1) < tol.TURNED).any():
                 chosen[k, i] = False
     if pairs:
-        row, mid, beside = np.array(pairs).T
-        grows = _grows_from(arm, task, q[row, mid], q[row, beside], curve[row, beside], target[row]) & (mid > 0)
-        chosen[row[grows], mid[grows]] = False
+        row, root, mate = np.array(pairs).T
+        same = _grows_from(arm, task, q[row, root], q[row, mate], curve[row, mate], target[row]) & (root > 0)
+        chosen[row[same], root[same]] = False
 
 
 def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, target: Array) -> Bool:
@@ -61,18 +61,19 @@ def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, tar
     directions are lost a curve of small residuals leaves the self-motion, off which the residual grows.
     """
     unit = radian_or_reach(arm)
-    apart = np.where(curve, 0.0, newton.difference(arm, motions, q))
+    offset = np.where(curve, 0.0, newton.difference(arm, motions, q))
     sigma, V, _ = newton.null_space(arm, task, q, target)
-    held = np.where(curve, 0.0, V[:, -1])
-    far = (apart * held).sum(axis=1) / np.maximum((held * held).sum(axis=1), tol.TINY)
-    ahead = apart + np.where(curve, V[:, -1] * np.clip(far, -tol.CLOSE_BY, tol.CLOSE_BY)[:, None], 0.0)
+    held_v = np.where(curve, 0.0, V[:, -1])
+    t = (offset * held_v).sum(axis=1) / np.maximum((held_v * held_v).sum(axis=1), tol.TINY)
+    tilted = offset + np.where(curve, V[:, -1] * np.clip(t, -tol.CLOSE_BY, tol.CLOSE_BY)[:, None], 0.0)
     q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
-    landed, size = newton.correct(arm, task, q + np.concatenate([apart, ahead]) * unit, goal, steps=6, least=tol.WEAK)
-    way = newton.difference(arm, landed, q)
-    close = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(way).max(axis=1) < tol.CLOSE_BY))
-    miss, joined = newton.misses(arm, task, q[close], goal[close]), np.zeros(len(q), bool)
-    joined[close] = high_order_roots.solves_between(arm, task, q[close], way[close], miss, sigma[close], goal[close])
-    return np.asarray(joined.reshape(2, -1).any(axis=0))
+    start = q + np.concatenate([offset, tilted]) * unit
+    landed, size = newton.correct(arm, task, start, goal, steps=6, least=tol.WEAK)
+    step = newton.difference(arm, landed, q)
+    close = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(step).max(axis=1) < tol.CLOSE_BY))
+    miss, is_one = newton.misses(arm, task, q[close], goal[close]), np.zeros(len(q), bool)
+    is_one[close] = high_order_roots.solves_between(arm, task, q[close], step[close], miss, sigma[close], goal[close])
+    return np.asarray(is_one.reshape(2, -1).any(axis=0))
 
 
 def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, linked: Bool, tube: Array) -> None:
@@ -91,24 +92,24 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
     k, i, j = np.nonzero((linked | listed[:, :, None] & listed[:, None]) & np.tri(q.shape[1], k=-1, dtype=bool))
     if not len(k):
         return
-    start, apart, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
-    same, size = linked[k, i, j], np.abs(apart)
+    start, offset, unit = q[k, i], newton.difference(arm, q[k, j], q[k, i]), radian_or_reach(arm)
+    is_one, distance = linked[k, i, j], np.abs(offset)
     # one of the two postures may be where its own self-motion meets the other's
-    turned = np.where(curve[k, i], 0.0, size).max(axis=1)
-    thick = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
-    held = (turned < thick) & ((size > thick[:, None]).sum(axis=1) <= LINE_JOINTS)
+    turned = np.where(curve[k, i], 0.0, distance).max(axis=1)
+    width = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
+    is_close = (turned < width) & ((distance > width[:, None]).sum(axis=1) <= LINE_JOINTS)
     # at one of the two postures a joint may move too slowly to be called free
-    most = np.maximum(turned, np.where(curve[k, j], 0.0, size).max(axis=1))
-    slow = ~held & (most > tol.TURNED) & (most < tol.DRIFT)
-    held |= np.equal(j, 0)  # `near` stands for all that meet there
-    open_ = np.flatnonzero(held & ~same)
-    same[open_] = _reached_straight(arm, task, start[open_], apart[open_], target[k[open_]])
-    left = np.flatnonzero(slow & ~same)
-    if len(left):  # whether the self-motion of the one goes round to the other
-        joints = curve[k[left], i[left]] | (size[left] > tol.SAME)
-        end, compared = (start[left] + apart[left] * unit)[:, None], np.ones((len(left), 1), bool)
-        same[left] = curves.share_circuit(arm, task, start[left], joints, end, compared, target[k[left]])[:, 0]
-    k, i, j = k[same], i[same], j[same]
+    most_turned = np.maximum(turned, np.where(curve[k, j], 0.0, distance).max(axis=1))
+    is_slow = ~is_close & (most_turned > tol.TURNED) & (most_turned < tol.DRIFT)
+    is_close |= np.equal(j, 0)  # `near` stands for all that meet there
+    unsure = np.flatnonzero(is_close & ~is_one)
+    is_one[unsure] = _reached_straight(arm, task, start[unsure], offset[unsure], target[k[unsure]])
+    slow = np.flatnonzero(is_slow & ~is_one)
+    if len(slow):  # whether the self-motion of the one goes round to the other
+        joints = curve[k[slow], i[slow]] | (distance[slow] > tol.SAME)
+        end, compared = (start[slow] + offset[slow] * unit)[:, None], np.ones((len(slow), 1), bool)
+        is_one[slow] = curves.share_circuit(arm, task, start[slow], joints, end, compared, target[k[slow]])[:, 0]
+    k, i, j = k[is_one], i[is_one], j[is_one]
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
     nearer = motion[k, i] < motion[k, j] - tol.SAME
     i, j = np.where(nearer, j, i), np.where(nearer, i, j)
@@ -116,33 +117,33 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
         chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
 
 
-def _reached_straight(arm: Arm, task: Task, q: Array, way: Array, target: Array) -> Bool:
-    """Whether the joints can move from q (M, n) to q + way while they keep the target, each at a constant pace: (M,).
+def _reached_straight(arm: Arm, task: Task, q: Array, offset: Array, target: Array) -> Bool:
+    """Whether the joints can move from q (M, n) to q + offset, each at a constant pace, and keep the target: (M,).
 
-    A quarter, half and three quarters of the way are asked, each way round for joints that turn by about 180 degrees.
+    A quarter, half and three quarters of it are asked, each way round for joints that turn by about 180 degrees.
     They may be off by as much as roots of high order are.
     """
     reached = np.zeros(len(q), bool)
     if not len(q):
         return reached
-    ways = [_both_ways(arm, single) for single in way]
-    index = np.repeat(np.arange(len(q)), [len(choices) for choices in ways])
-    start = q[index] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(ways) * radian_or_reach(arm)
+    offsets = [_both_ways(arm, single) for single in offset]
+    index = np.repeat(np.arange(len(q)), [len(choices) for choices in offsets])
+    start = q[index] + np.array([0.25, 0.5, 0.75])[:, None, None] * np.concatenate(offsets) * radian_or_reach(arm)
     goal = np.concatenate([target[index]] * 3)
     landed, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=tol.WEAK)
-    moved = np.abs(newton.difference(arm, landed, start.reshape(-1, arm.n))).max(axis=1)
-    good = (size <= tol.SOLUTION) & (moved < 10 * tol.TURNED)
-    reached[index[good.reshape(3, -1).all(axis=0)]] = True
+    deviation = np.abs(newton.difference(arm, landed, start.reshape(-1, arm.n))).max(axis=1)
+    keeps_target = (size <= tol.SOLUTION) & (deviation < 10 * tol.TURNED)
+    reached[index[keeps_target.reshape(3, -1).all(axis=0)]] = True
     return reached
 
 
-def _both_ways(arm: Arm, way: Array) -> Array:
-    """A way (n,) each way round for joints that turn by about 180 degrees: (m, n)."""
-    half = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(way) < tol.REACH))
-    flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half))))
-    ways = np.tile(way, (len(flips), 1))
-    ways[:, half] -= 2.0 * np.pi * flips * np.sign(way[half])
-    return ways
+def _both_ways(arm: Arm, offset: Array) -> Array:
+    """An offset (n,) each way round for joints that turn by about 180 degrees: (m, n)."""
+    half_turns = np.flatnonzero(~arm.prismatic & (np.pi - np.abs(offset) < tol.REACH))
+    flips = np.array(list(itertools.product((0.0, 1.0), repeat=len(half_turns))))
+    offsets = np.tile(offset, (len(flips), 1))
+    offsets[:, half_turns] -= 2.0 * np.pi * flips * np.sign(offset[half_turns])
+    return offsets
 
 
 def pull_back(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
@@ -156,25 +157,25 @@ def push_along(arm: Arm, task: Task, q: Array, step: Array, push: Array, target:
     """
     unit = radian_or_reach(arm)
     landed, size = pull_back(arm, task, q + step[:, None] * push * unit, target)
-    far = (np.abs(landed - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
-    return landed, size, np.where(far, size - newton.misses(arm, task, q, target), np.inf) / step
+    went_far = (np.abs(landed - q) / unit).max(axis=1) > 0.3 * step * np.abs(push).max(axis=1)
+    return landed, size, np.where(went_far, size - newton.misses(arm, task, q, target), np.inf) / step
 
 
-def _equally_long(away: Array, push: Array) -> Bool:
+def _equally_long(offsets: Array, push: Array) -> Bool:
     """Whether motions (2, 2, M, n), by a short step and a long one, both ways along push (M, n), are about as long."""
-    least = 0.3 * STEPS * np.abs(push).max(axis=1)  # (2, M)
-    far = (np.abs(away).max(axis=3) > least[:, None]).all(axis=1)
-    return np.asarray(far & (np.abs(away[:, 0] - away[:, 1]).max(axis=2) > 0.3 * least))
+    least_length = 0.3 * STEPS * np.abs(push).max(axis=1)  # (2, M)
+    all_far = (np.abs(offsets).max(axis=3) > least_length[:, None]).all(axis=1)
+    return np.asarray(all_far & (np.abs(offsets[:, 0] - offsets[:, 1]).max(axis=2) > 0.3 * least_length))
 
 
-def _moving_joints(away: Array, long: Bool) -> Bool:
+def _moving_joints(offsets: Array, is_motion: Bool) -> Bool:
     """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
 
     Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back to a meeting ends anywhere
     nearby: neither is motion of a joint.
     """
-    most = np.abs(away).max(axis=1)
-    return np.asarray(np.where(long[:, None], most[1] > tol.MOVED * 10 * STEP, most[0] > 10 * tol.TURNED))
+    length = np.abs(offsets).max(axis=1)
+    return np.asarray(np.where(is_motion[:, None], length[1] > tol.MOVED * 10 * STEP, length[0] > 10 * tol.TURNED))
 
 
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
@@ -184,32 +185,32 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     row, push = null_directions(arm.n, V, nullity)
     # The first pass decides which candidates do not move, most: their residual grows by more than `GROWTH`. Where
     # several directions are lost, its step is long: a short one would be drawn back to the meeting.
-    several = nullity[row] > 1
-    first = np.where(several, 10 * STEP, STEP)
-    _, _, growth = push_along(arm, task, q[row], first, push, target[row])
-    going = np.flatnonzero(growth <= tol.GROWTH)
+    loses_several = nullity[row] > 1
+    step = np.where(loses_several, 10 * STEP, STEP)
+    _, _, growth = push_along(arm, task, q[row], step, push, target[row])
+    movable = np.flatnonzero(growth <= tol.GROWTH)
     # The second pass decides this of those that lose one direction and miss by more than rounding, by a longer step.
-    alone = ~several[going] & (growth[going] * first[going] > tol.CLOSED)
-    if alone.any():
-        tried = going[alone]
-        _, _, growth = push_along(arm, task, q[row[tried]], 10 * first[tried], push[tried], target[row[tried]])
-        alone[alone] = ~(growth <= tol.GROWTH)
-        going = going[~alone]
-    if not len(going):
+    loses_one = ~loses_several[movable] & (growth[movable] * step[movable] > tol.CLOSED)
+    if loses_one.any():
+        tried = movable[loses_one]
+        _, _, growth = push_along(arm, task, q[row[tried]], 10 * step[tried], push[tried], target[row[tried]])
+        loses_one[loses_one] = ~(growth <= tol.GROWTH)
+        movable = movable[~loses_one]
+    if not len(movable):
         return moving, joints
-    row, push, several = row[going], push[going], several[going]
+    row, push, loses_several = row[movable], push[movable], loses_several[movable]
     # Each posture takes a short and a long step, whole and in part, both ways, in one call: (2, 2, 2, m, n); a joint
     # that rests at a double root comes half the way back in each.
-    ways = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
-    start = q[row] + ways * push * unit
+    step_lengths = np.multiply.outer(STEPS[:, 0], [[1.0, 0.6], [-1.0, -0.6]])[..., None, None]
+    start = q[row] + step_lengths * push * unit
     landed, size = pull_back(arm, task, start.reshape(-1, arm.n), np.concatenate([target[row]] * 8), steps=20)
-    away, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
+    offsets, size = (landed.reshape(start.shape)[:, :, 0] - q[row]) / unit, size.reshape(start.shape[:4])
     growth = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
-    short, long = (growth <= tol.GROWTH * STEPS) & _equally_long(away, push)
+    short_holds, long_holds = (growth <= tol.GROWTH * STEPS) & _equally_long(offsets, push)
     # A residual above rounding must stay small up to the long step: a fold's first tenth of a radian shows nothing.
-    along = (short & ((growth[0] <= tol.CLOSED) | long)) | (long & several)
-    np.logical_or.at(moving, row, along)
-    np.logical_or.at(joints, row, along[:, None] & _moving_joints(away, long))
+    is_motion = (short_holds & ((growth[0] <= tol.CLOSED) | long_holds)) | (long_holds & loses_several)
+    np.logical_or.at(moving, row, is_motion)
+    np.logical_or.at(joints, row, is_motion[:, None] & _moving_joints(offsets, long_holds))
     return moving, joints
 
 
@@ -222,16 +223,16 @@ def on_surface(
     more directions are lost surfaces meet, and rounding chooses the vectors: there any of `null_directions` tells.
     Also whose the long steps are, and what `push_along` says of these.
     """
-    two, more = np.flatnonzero(nullity < 3), np.flatnonzero(nullity > 2)
-    row, push = two, V[two, arm.n - 1] + 0.7 * V[two, arm.n - 2]
-    if len(more):
-        more_rows, further = null_directions(arm.n, V[more], nullity[more])
-        row, push = np.concatenate([row, more[more_rows]]), np.concatenate([push, further])
+    pairs, several = np.flatnonzero(nullity < 3), np.flatnonzero(nullity > 2)
+    row, push = pairs, V[pairs, arm.n - 1] + 0.7 * V[pairs, arm.n - 2]
+    if len(several):
+        more_rows, more_push = null_directions(arm.n, V[several], nullity[several])
+        row, push = np.concatenate([row, several[more_rows]]), np.concatenate([push, more_push])
     pushed = landed, size, _ = push_along(arm, task, q[row], np.full(len(row), 10 * STEP), push, target[row])
-    lost = newton.null_space(arm, task, landed, target[row])[2]
-    away = np.abs(newton.difference(arm, landed, q[row])).max(axis=1)
+    nullity_there = newton.null_space(arm, task, landed, target[row])[2]
+    distance = np.abs(newton.difference(arm, landed, q[row])).max(axis=1)
     surface = np.zeros(len(q), bool)
-    np.logical_or.at(surface, row, (size <= tol.SOLUTION) & (lost > 1) & (away > 3 * STEP))
+    np.logical_or.at(surface, row, (size <= tol.SOLUTION) & (nullity_there > 1) & (distance > 3 * STEP))
     return surface, row, pushed
 
 
@@ -242,17 +243,17 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
     """
     pushes = list(_null_directions(n, V, nullity))
     row, push = np.concatenate([w for w, _ in pushes]), np.concatenate([p for _, p in pushes])
-    first = (np.abs(push) > 0.1).argmax(axis=1)
-    ahead = np.sign(np.take_along_axis(push, first[:, None], axis=1))
-    _, once = np.unique(np.column_stack([row, np.rint(1e6 * push * ahead)]), axis=0, return_index=True)
-    once.sort()
-    return row[once], push[once]
+    lead = (np.abs(push) > 0.1).argmax(axis=1)
+    sign = np.sign(np.take_along_axis(push, lead[:, None], axis=1))
+    _, unique_rows = np.unique(np.column_stack([row, np.rint(1e6 * push * sign)]), axis=0, return_index=True)
+    unique_rows.sort()
+    return row[unique_rows], push[unique_rows]
 
 
-def _normals(held: Array) -> Array:
+def _normals(columns: Array) -> Array:
     """Vectors (..., k) at right angles to the k - 1 columns of (..., k, k - 1): of three, the cross product."""
-    k = held.shape[-2]
-    return np.stack([(-1) ** i * np.linalg.det(np.delete(held, i, axis=-2)) for i in range(k)], axis=-1)
+    k = columns.shape[-2]
+    return np.stack([(-1) ** i * np.linalg.det(np.delete(columns, i, axis=-2)) for i in range(k)], axis=-1)
 
 
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
@@ -267,8 +268,8 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
     for k in range(2, int(nullity.max()) + 1):
         rows = np.flatnonzero(nullity == k)
         basis = V[rows, ::-1][:, :k]
-        held = list(itertools.combinations(range(n), k - 1))
-        yield _long_directions(rows, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, held], 2, 0)), basis))
+        fixed = list(itertools.combinations(range(n), k - 1))
+        yield _long_directions(rows, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, fixed], 2, 0)), basis))
     several = np.flatnonzero(nullity > 1)
     in_null = (np.arange(n) >= n - nullity[several][:, None])[:, :, None]
     yield _long_directions(several, np.moveaxis(V[several].swapaxes(1, 2) @ np.where(in_null, V[several], 0.0), 1, 0))
@@ -277,5 +278,5 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
 def _long_directions(row: Int, push: Array) -> tuple[Int, Array]:
     """The directions (C, m, n) of postures (m,) that are long enough, made of length one, and whose they are."""
     size = np.linalg.norm(push, axis=2)
-    far = size > 0.1
-    return np.broadcast_to(row, size.shape)[far], push[far] / size[far][:, None]
+    is_long = size > 0.1
+    return np.broadcast_to(row, size.shape)[is_long], push[is_long] / size[is_long][:, None]

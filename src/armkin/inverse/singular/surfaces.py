@@ -45,42 +45,42 @@ def _with_curves(goals: Goals, decision: Examined, k: np.intp) -> Examined:
     arm, subset = goals.arm, goals.of(np.array([k]))
     q, label = decision.q[k, decision.valid[k]], decision.label[k, decision.valid[k]]
     J, rests = _jacobians(subset, q)
-    options = [_curves(subset, q[about], label[about], pair) for pair, about in _pairs(arm, J, rests)]
+    options = [_other_curves(subset, q[on_line], label[on_line], pair) for pair, on_line in _joint_pairs(arm, J, rests)]
     if not options:
         return decision
-    rows, names, free, pair = max(options, key=lambda curves: len(curves[0]))
+    rows, labels, free, pair = max(options, key=lambda curves: len(curves[0]))
     if not len(rows):
         return decision
-    about = _about_one_line(J, pair)
-    rows, names = np.concatenate([q[~about], rows]), np.append(label[~about], names)
+    on_line = _about_one_line(J, pair)
+    rows, labels = np.concatenate([q[~on_line], rows]), np.append(label[~on_line], labels)
     q, valid, label = (widen_columns(array, len(rows)) for array in (decision.q, decision.valid, decision.label))
     listed = decision._replace(q=q, valid=valid, label=label, free=decision.free.copy())
     used = np.arange(listed.q.shape[1]) < len(rows)
     listed.q[k], listed.valid[k], listed.label[k] = np.nan, used, OWN_LABEL
-    listed.q[k, used], listed.label[k, used] = rows, names
+    listed.q[k, used], listed.label[k, used] = rows, labels
     listed.free[k] |= free
     return listed
 
 
-def _curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int, Bool, Pair]:
+def _other_curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array, Int, Bool, Pair]:
     """The curves that postures q (M, n) of one target lie on, and all others, with the second joint of a pair held: a
     posture of each, its label, and the joints that move (n,) besides the surfaces' others."""
     arm, task, target, [near] = goals
-    i, j, way = pair
+    i, j, sense = pair
     turned = q.copy()
-    turned[:, i] += way * (turned[:, j] - near[j])
+    turned[:, i] += sense * (turned[:, j] - near[j])
     joints = np.delete(np.arange(arm.n), j)
     held_arm = lock(arm, {arm.joint_names[j]: float(near[j])})
     starts = newton.many_starts(held_arm, task, target, np.ones(1, bool))[0]
     starts = starts[~np.isnan(starts[:, 0])]
-    marks = np.concatenate([label, np.full(len(starts), OWN_LABEL)])
-    seeds = Seeds.of(np.concatenate([turned[:, joints], starts])[None], marks[None])
+    labels = np.concatenate([label, np.full(len(starts), OWN_LABEL)])
+    seeds = Seeds.of(np.concatenate([turned[:, joints], starts])[None], labels[None])
     decision = examine(Goals(held_arm, task, target, near[None, joints]), seeds, no_more)
     valid = decision.valid[0]
     rows, free = np.insert(decision.q[0, valid], j, near[j], axis=1), np.insert(decision.free[0], j, True)
     free[i] = True
-    about = _about_one_line(_jacobians(goals, rows)[0], pair)
-    return rows[about], decision.label[0, valid][about], free, pair
+    shares_line = _about_one_line(_jacobians(goals, rows)[0], pair)
+    return rows[shares_line], decision.label[0, valid][shares_line], free, pair
 
 
 def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
@@ -88,10 +88,10 @@ def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
     arm, task, target, _ = goals
     _, J = newton.scaled(arm, task, q, np.repeat(target, len(q), axis=0))
     S, V = np.linalg.svd(J)[1:]
-    lost = arm.n - (S > tol.WEAK).sum(axis=1)
-    null = np.arange(arm.n) >= arm.n - lost[:, None]
-    moves = (np.where(null[:, :, None], np.abs(V), 0.0) > tol.FOLDED).any(axis=1)
-    return J, np.asarray(~moves & (lost > 1)[:, None])
+    nullity = arm.n - (S > tol.WEAK).sum(axis=1)
+    in_null = np.arange(arm.n) >= arm.n - nullity[:, None]
+    has_motion = (np.where(in_null[:, :, None], np.abs(V), 0.0) > tol.FOLDED).any(axis=1)
+    return J, np.asarray(~has_motion & (nullity > 1)[:, None])
 
 
 def _about_one_line(J: Array, pair: Pair) -> Bool:
@@ -99,18 +99,18 @@ def _about_one_line(J: Array, pair: Pair) -> Bool:
 
     Where an elbow is stretched they are known to the root of rounding.
     """
-    i, j, way = pair
-    return np.asarray(np.abs(J[:, :, j] - way * J[:, :, i]).max(axis=1) < tol.FOLDED)
+    i, j, sense = pair
+    return np.asarray(np.abs(J[:, :, j] - sense * J[:, :, i]).max(axis=1) < tol.FOLDED)
 
 
-def _pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:
+def _joint_pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:
     """Pairs of joints that are about one line in some posture in which those between them rest; all postures (M,) in
     which they are about one.
     """
     pairs = []
     for i, j in itertools.combinations(np.flatnonzero(~arm.prismatic).tolist(), 2):
-        for way in (1.0, -1.0):
-            about = _about_one_line(J, (i, j, way))
-            if (about & rests[:, i + 1 : j].all(axis=1)).any():
-                pairs.append(((i, j, way), about))
+        for sense in (1.0, -1.0):
+            shares_line = _about_one_line(J, (i, j, sense))
+            if (shares_line & rests[:, i + 1 : j].all(axis=1)).any():
+                pairs.append(((i, j, sense), shares_line))
     return pairs
