@@ -36,17 +36,17 @@ class Followed(NamedTuple):
     def along(cls, follower: Follower) -> Followed:
         """Curves of the targets in two ways: those of which all places of a change are known, and others."""
         N = len(follower.target)
-        parts, short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
-        of = boundaries(follower.arm) if follower.free.joint == follower.arm.n - 1 else None
-        if of is not None:
-            angles, decided = boundary_angles(of, follower.target)
+        parts, is_short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
+        bounds = boundaries(follower.arm) if follower.free.joint == follower.arm.n - 1 else None
+        if bounds is not None:
+            angles, decided = boundary_angles(bounds, follower.target)
             if len(rows := np.flatnonzero(decided)):
-                pieces, short[rows], complete[rows] = _between_places(follower.of(rows), angles[rows])
+                pieces, is_short[rows], complete[rows] = _between_places(follower.of(rows), angles[rows])
                 parts.append(pieces._replace(row=rows[pieces.row]))
         if len(rows := np.flatnonzero(~complete)):
-            pieces, short[rows] = _sampled_pieces(follower.of(rows), 1)
+            pieces, is_short[rows] = _sampled_pieces(follower.of(rows), 1)
             parts.append(pieces._replace(row=rows[pieces.row]))
-        return cls(follower, stack_rows(parts), short, complete)
+        return cls(follower, stack_rows(parts), is_short, complete)
 
     def values_to_try(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
@@ -63,55 +63,55 @@ class Followed(NamedTuple):
 def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
     targets those are (N,)."""
-    shown = summary_of_samples(follower, over_a_turn(EVEN_SAMPLES), angles)
-    changes = shown.crossed.at, shown.gone.at
-    legal, present = ends = [place_between(shown.t, change, angles) for change in changes]
-    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(shown.crossed.rooms).any(axis=1))
+    summary = summary_of_samples(follower, over_a_turn(EVEN_SAMPLES), angles)
+    changes = summary.crossed.at, summary.gone.at
+    legal, present = ends = [place_between(summary.t, change, angles) for change in changes]
+    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(summary.crossed.rooms).any(axis=1))
     legal[crossing] = crossed_at(follower, rows_of(changes[0], crossing), legal[crossing])
     explained = np.ones(len(angles), bool)
     for change, end in zip(changes, ends, strict=True):
         explained[change.row[np.isinf(end)]] = False
-    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (shown.legal, shown.there))
-    pieces = _of_runs(shown.t, intervals, True, changes[0], legal)
-    without = _of_runs(shown.t, rows_of(families, ~families.within), False, changes[1], present)
-    return stack_rows([pieces, without]), shown.short, explained
+    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (summary.legal, summary.there))
+    pieces = _of_runs(summary.t, intervals, True, changes[0], legal)
+    illegal = _of_runs(summary.t, rows_of(families, ~families.within), False, changes[1], present)
+    return stack_rows([pieces, illegal]), summary.short, explained
 
 
 def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
     answer, is asked again: all of a nearly stretched arm lie within a degree."""
-    shown = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
-    pieces, short = _all_pieces(follower, shown), shown.short
+    summary = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
+    pieces, is_short = _all_pieces(follower, summary), summary.short
     if finer == 1:
         within_reach = distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
-        lost = shown.lost & (follower.arm.prismatic.any() | within_reach)
-        for more, asked_again in ((CLOSER_FACTOR, shown.hidden & ~lost), (FINER_FACTOR, lost)):
-            again = np.flatnonzero(asked_again)
-            at_once = max(SAMPLES // more, 1)
-            for rows in (again[k : k + at_once] for k in range(0, len(again), at_once)):
-                part, part_short = _sampled_pieces(follower.of(rows), more)
-                unchanged, closer = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
-                pieces = stack_rows([unchanged, closer])
-                short[rows] = part_short
-    return pieces, short
+        unanswered = summary.lost & (follower.arm.prismatic.any() | within_reach)
+        for factor, repeated in ((CLOSER_FACTOR, summary.hidden & ~unanswered), (FINER_FACTOR, unanswered)):
+            targets = np.flatnonzero(repeated)
+            at_once = max(SAMPLES // factor, 1)
+            for rows in (targets[k : k + at_once] for k in range(0, len(targets), at_once)):
+                part, part_short = _sampled_pieces(follower.of(rows), factor)
+                unchanged, new_pieces = rows_of(pieces, ~np.isin(pieces.row, rows)), part._replace(row=rows[part.row])
+                pieces = stack_rows([unchanged, new_pieces])
+                is_short[rows] = part_short
+    return pieces, is_short
 
 
-def _all_pieces(follower: Follower, shown: Summary) -> Pieces:
+def _all_pieces(follower: Follower, summary: Summary) -> Pieces:
     """All pieces of the curves of some targets."""
-    t, K = shown.t, shown.t.shape[1]
-    places = places_of(follower, shown)
-    hidden, stretch = hidden_stretches(follower, t, shown.turns)
+    t, K = summary.t, summary.t.shape[1]
+    places = places_of(follower, summary)
+    hidden, stretch = hidden_stretches(follower, t, summary.turns)
     gaps = hidden.set_before
-    more, short = rows_of(hidden, ~gaps), places.short
-    parts = [_of_runs(t, shown.legal, True, shown.crossed.at, places.legal)]
-    present = shown.there
-    of = present.row[:, None] == np.append(hidden.row, short.row)
-    of &= present.branch[:, None] == np.append(hidden.branch, short.branch)
-    of &= (np.append(hidden.k, short.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
-    families = _of_runs(t, present, False, shown.gone.at, places.there)
-    parts.append(rows_of(families, ~(present.within | of.any(axis=1))))  # families that hold one of these are left out
+    stretches, ends = rows_of(hidden, ~gaps), places.short
+    parts = [_of_runs(t, summary.legal, True, summary.crossed.at, places.legal)]
+    present = summary.there
+    holds = present.row[:, None] == np.append(hidden.row, ends.row)
+    holds &= present.branch[:, None] == np.append(hidden.branch, ends.branch)
+    holds &= (np.append(hidden.k, ends.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
+    families = _of_runs(t, present, False, summary.gone.at, places.there)
+    parts.append(rows_of(families, ~(present.within | holds.any(axis=1))))  # families that hold one are left out
     parts[0] = _without_gaps(follower, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
-    row, branch = np.append(short.row, more.row), np.append(short.branch, more.branch)
+    row, branch = np.append(ends.row, stretches.row), np.append(ends.branch, stretches.branch)
     if len(row):
         a, b = np.concatenate([np.sort(places.ends, axis=0), stretch[:, ~gaps]], axis=1)
         middle = 0.5 * (a + b)
@@ -122,8 +122,8 @@ def _all_pieces(follower: Follower, shown: Summary) -> Pieces:
 
 def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
     """The pieces that hold runs of samples at t (N, K); ends: where changes are."""
-    K, best = t.shape[1], runs.first + runs.best
-    low, centre, high = (value_at(t, runs.row, best + side) for side in (-1, 0, 1))
+    K, sample = t.shape[1], runs.first + runs.best
+    low, centre, high = (value_at(t, runs.row, sample + side) for side in (-1, 0, 1))
     a, b = np.full(len(centre), -np.pi), np.full(len(centre), np.pi)
     cut = np.flatnonzero(runs.length < K)
     row, first, branch = runs.row[cut], runs.first[cut], runs.branch[cut]
@@ -139,13 +139,13 @@ def _without_gaps(follower: Follower, pieces: Pieces, gaps: Changes, ends: Array
     """Pieces with gaps taken out that lie within them, from where to where (2, G)."""
     for row, branch, (begin, end) in zip(gaps.row, gaps.branch, ends.T, strict=True):
         turns = 2 * np.pi * np.round((0.5 * (pieces.a + pieces.b) - begin) / (2 * np.pi))
-        inside = (pieces.row == row) & (pieces.branch == branch) & (pieces.a < begin + turns) & (end + turns < pieces.b)
-        for p in np.flatnonzero(inside):
+        spans = (pieces.row == row) & (pieces.branch == branch) & (pieces.a < begin + turns) & (end + turns < pieces.b)
+        for p in np.flatnonzero(spans):
             piece = rows_of(pieces, np.array([p]))
-            before, behind = np.array([begin + turns[p]]), np.array([end + turns[p]])
-            sides = [(piece.a, before), (behind, piece.b)]
+            gap_begin, gap_end = np.array([begin + turns[p]]), np.array([end + turns[p]])
+            sides = [(piece.a, gap_begin), (gap_end, piece.b)]
             if pieces.b[p] - pieces.a[p] >= 2 * np.pi:  # a whole turn is one piece that begins behind the gap
-                sides = [(behind, before + 2 * np.pi)]
+                sides = [(gap_end, gap_begin + 2 * np.pi)]
             parts = [rows_of(pieces, np.arange(len(pieces.row)) != p)]
             for a, b in sides:
                 holds = (a <= piece.at) & (piece.at <= b)

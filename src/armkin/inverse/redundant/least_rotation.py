@@ -30,8 +30,8 @@ class Box(NamedTuple):
 
 def box_of(arm: Arm) -> Box:
     """The limits of an arm, inf where a joint has a whole turn or more."""
-    wide = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
-    return Box(np.where(wide, -np.inf, arm.lower), np.where(wide, np.inf, arm.upper), np.asarray(radian_or_reach(arm)))
+    free = ~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi)
+    return Box(np.where(free, -np.inf, arm.lower), np.where(free, np.inf, arm.upper), np.asarray(radian_or_reach(arm)))
 
 
 class _Local(NamedTuple):
@@ -71,18 +71,18 @@ class _Tangent(NamedTuple):
     slope: Array  # (M, n) of the Lagrangian
 
 
-def _tangent(local: _Local, held: Bool) -> _Tangent:
-    n = held.shape[1]
-    J = np.where(held[:, None, :], 0.0, local.J)
+def _tangent(local: _Local, at_limit: Bool) -> _Tangent:
+    n = at_limit.shape[1]
+    J = np.where(at_limit[:, None, :], 0.0, local.J)
     U, S, Vt = np.linalg.svd(J, full_matrices=False)
     gain = np.where(S > tol.WEAK, 1.0 / np.maximum(S, tol.WEAK), 0.0)
-    back = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
+    inverse_J = np.einsum("mkn,mk,mak->mna", Vt, gain, U)
     rows = Vt * (S > tol.WEAK)[:, :, None]
-    P = np.eye(n) * ~held[:, :, None] - rows.swapaxes(1, 2) @ rows
-    multipliers = -np.einsum("mna,mn->ma", back, np.where(held, 0.0, local.g))
+    P = np.eye(n) * ~at_limit[:, :, None] - rows.swapaxes(1, 2) @ rows
+    multipliers = -np.einsum("mna,mn->ma", inverse_J, np.where(at_limit, 0.0, local.g))
     slope = local.g + np.einsum("man,ma->mn", local.J, multipliers)
     H = local.H + np.einsum("maij,ma->mij", local.bend, multipliers)
-    return _Tangent(P, back, P @ H @ P, slope)
+    return _Tangent(P, inverse_J, P @ H @ P, slope)
 
 
 class _Move(NamedTuple):
@@ -97,28 +97,28 @@ class _Move(NamedTuple):
     blocked: Bool  # (M,) a limit takes hold first
 
 
-def _newton_step(box: Box, local: _Local, x: Array, held: Bool) -> _Move:
-    """Newton's step of postures x (M, n), at limits held (M, n), which lets go of one of them where it is to."""
+def _newton_step(box: Box, local: _Local, x: Array, at_limit: Bool) -> _Move:
+    """Newton's step of postures x (M, n), some at_limit (M, n), which lets go of one of them where it is to."""
     low, high = x <= box.lower, x >= box.upper
-    held &= low | high
-    tangent = _tangent(local, held)
-    across = np.einsum("mij,mj->mi", tangent.P, local.g)
-    flat = np.abs(across).max(axis=1) <= tol.STATIONARY
+    at_limit &= low | high
+    tangent = _tangent(local, at_limit)
+    gradient = np.einsum("mij,mj->mi", tangent.P, local.g)
+    stationary = np.abs(gradient).max(axis=1) <= tol.STATIONARY
     # at a stationary point the limit whose multiplier points away from it most strongly is let go
-    pull = np.where(held & low, -tangent.slope, np.where(held & high, tangent.slope, -np.inf))
-    leaves = flat & (pull.max(axis=1) > tol.STATIONARY)
+    pull = np.where(at_limit & low, -tangent.slope, np.where(at_limit & high, tangent.slope, -np.inf))
+    leaves = stationary & (pull.max(axis=1) > tol.STATIONARY)
     values, vectors = np.linalg.eigh(tangent.H)
-    placed = np.abs(local.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
-    minimum = flat & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & placed
-    held[leaves, pull.argmax(axis=1)[leaves]] = False
-    saddle = flat & ~leaves & ~minimum
-    along = np.einsum("mij,mi->mj", vectors, -across)
-    step = np.einsum("mij,mj->mi", vectors, along / np.maximum(np.abs(values), tol.LEVEL_CURVATURE))
+    in_position = np.abs(local.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
+    minimum = stationary & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & in_position
+    at_limit[leaves, pull.argmax(axis=1)[leaves]] = False
+    saddle = stationary & ~leaves & ~minimum
+    components = np.einsum("mij,mi->mj", vectors, -gradient)
+    step = np.einsum("mij,mj->mi", vectors, components / np.maximum(np.abs(values), tol.LEVEL_CURVATURE))
     step[saddle] = vectors[saddle, :, 0] * 0.05
-    step = np.where(held, 0.0, step + np.einsum("mna,ma->mn", tangent.back, local.missed))
-    pressed = ((low & (step < 0)) | (high & (step > 0))) & ~held
-    held |= pressed
-    return _Move(step, tangent.back, pressed, flat, minimum, leaves, pressed.any(axis=1) & ~leaves)
+    step = np.where(at_limit, 0.0, step + np.einsum("mna,ma->mn", tangent.back, local.missed))
+    pressed = ((low & (step < 0)) | (high & (step > 0))) & ~at_limit
+    at_limit |= pressed
+    return _Move(step, tangent.back, pressed, stationary, minimum, leaves, pressed.any(axis=1) & ~leaves)
 
 
 def _try_step(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Array) -> tuple[Array, Bool]:
@@ -132,38 +132,38 @@ def _try_step(arm: Arm, box: Box, x: Array, goal: Array, move: _Move, trust: Arr
     trial = np.clip(x + np.where(move.pressed, 0.0, step * reach[:, None]) * box.unit, box.lower, box.upper)
     trial = np.where(hit & (step > 0), box.upper, np.where(hit & (step < 0), box.lower, trial))
     for _ in range(2):  # back onto the position, with the Jacobian of before
-        missed = (goal[:, :3, 3] - position(arm, trial)) / arm.reach
-        trial = np.clip(trial + np.einsum("mna,ma->mn", move.back, missed) * box.unit, box.lower, box.upper)
+        offset = (goal[:, :3, 3] - position(arm, trial)) / arm.reach
+        trial = np.clip(trial + np.einsum("mna,ma->mn", move.back, offset) * box.unit, box.lower, box.upper)
     return trial, hit
 
 
 def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
     """Newton's method along the postures at a position, from each (M, n) to a local minimum; which got there (M,)."""
     q, M = q.copy(), len(q)
-    held = np.zeros(q.shape, bool)
+    at_limit = np.zeros(q.shape, bool)
     trust = np.full(M, 0.5)
     arrived = np.zeros(M, bool)
     active = np.arange(M)
     for _ in range(STEPS):
         if not len(active):
             break
-        x, goal, hold = q[active], target[active], held[active]
+        x, goal, hold = q[active], target[active], at_limit[active]
         local = _local(arm, box, x, goal)
         move = _newton_step(box, local, x, hold)
         arrived[active[move.rest]] = True
-        held[active] = hold
+        at_limit[active] = hold
         trial, hit = _try_step(arm, box, x, goal, move, trust[active])
         T = fk(arm, trial)
-        missed = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
+        miss = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
-        before = local.f + 10.0 * np.linalg.norm(local.missed, axis=1)
-        better = (f + 10.0 * missed <= before + tol.SOLUTION * tol.SAME) & ~move.rest & ~move.leaves
-        better &= ~(move.blocked & move.flat)
-        go = active[better]
-        q[go] = trial[better]
-        held[go] |= hit[better]
+        last_merit = local.f + 10.0 * np.linalg.norm(local.missed, axis=1)
+        is_better = (f + 10.0 * miss <= last_merit + tol.SOLUTION * tol.SAME) & ~move.rest & ~move.leaves
+        is_better &= ~(move.blocked & move.flat)
+        go = active[is_better]
+        q[go] = trial[is_better]
+        at_limit[go] |= hit[is_better]
         trust[go] = np.minimum(2.0 * trust[go], 0.5)
-        refused = active[~better & ~move.rest & ~move.blocked & ~move.leaves]
+        refused = active[~is_better & ~move.rest & ~move.blocked & ~move.leaves]
         trust[refused] *= 0.25
         active = active[~move.rest & (trust[active] > tol.SOLUTION)]
     return q, arrived
@@ -173,8 +173,8 @@ def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     """Whether minima (M, n) of one target lie on a curve of such."""
     box = box_of(arm)
     local = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
-    held = (q <= box.lower) | (q >= box.upper)
-    tangent = _tangent(local, held)
+    at_limit = (q <= box.lower) | (q >= box.upper)
+    tangent = _tangent(local, at_limit)
     values, vectors = np.linalg.eigh(tangent.H)
-    inside = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
-    return np.asarray((inside & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1))
+    in_tangent = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
+    return np.asarray((in_tangent & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1))

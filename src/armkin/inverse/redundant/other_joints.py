@@ -99,23 +99,23 @@ class Follower(NamedTuple):
             goal = move_targets(self.arm, self.free, self.target[rows], t)
             s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
             return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
-        q, missed = self.candidates(rows, t)
-        np.copyto(q, np.nan, where=~(missed <= tol.ACCEPTED)[..., None])
+        q, misses = self.candidates(rows, t)
+        np.copyto(q, np.nan, where=~(misses <= tol.ACCEPTED)[..., None])
         return q
 
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
         """All branches (M, B, n) of a closed form, real or not, and what they miss (M, B)."""
         axes = _recorded_form(self.arm, self.free)[1]
         columns = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
-        missed = np.empty(columns.shape[1:])
+        misses = np.empty(columns.shape[1:])
         room: list[NDArray[Any]] = []
         for part in slices(len(t), AT_A_TIME):
             shape = (*axes, part.stop - part.start)
             *values, miss, room = self._candidates(rows[part], t[part], room)
             for j, q in enumerate(values):
                 columns[j, :, part] = np.broadcast_to(q, shape).reshape(-1, shape[-1])
-            missed[:, part] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
-        return columns.transpose(2, 1, 0), np.sqrt(missed.T)
+            misses[:, part] = np.broadcast_to(miss, shape).reshape(-1, shape[-1])
+        return columns.transpose(2, 1, 0), np.sqrt(misses.T)
 
     def _candidates(self, rows: Int, t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
@@ -128,17 +128,17 @@ class Follower(NamedTuple):
         values.insert(self.free.joint, t)
         return [*values, miss, room]
 
-    def samples_at(self, pick: Int, t: Array, more: Array | None = None) -> Sampled:
-        """Some of the targets (S,), of a closed form, at all of t (K,) and at more values (S, M), inf where there are
+    def samples_at(self, pick: Int, t: Array, extra: Array | None = None) -> Sampled:
+        """Some of the targets (S,), of a closed form, at all of t (K,) and at extra values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
         rows, values = np.repeat(pick, len(t)), np.tile(t, len(pick))
         axes = _recorded_form(self.arm, self.free)[1]
-        *columns, missed, _ = self._candidates(rows, values, [])
-        if more is None:
-            more = _values_between(self.arm, columns, missed, axes, t)
-        real = np.isfinite(more)
-        *added, added_miss, _ = self._candidates(np.broadcast_to(pick[:, None], more.shape)[real], more[real], [])
-        every = np.concatenate([np.tile(t, (len(pick), 1)), np.where(real, more, t[-1])], axis=1)
+        *columns, misses, _ = self._candidates(rows, values, [])
+        if extra is None:
+            extra = _values_between(self.arm, columns, misses, axes, t)
+        real = np.isfinite(extra)
+        *added, added_miss, _ = self._candidates(np.broadcast_to(pick[:, None], extra.shape)[real], extra[real], [])
+        every = np.concatenate([np.tile(t, (len(pick), 1)), np.where(real, extra, t[-1])], axis=1)
         order = np.argsort(every, axis=1, kind="stable")
 
         def merged(first: Array, second: Array) -> Array:
@@ -151,11 +151,11 @@ class Follower(NamedTuple):
             return np.take_along_axis(samples, order.reshape(*[1] * len(axes), S, K), axis=-1).reshape(*axes, -1)
 
         columns = [merged(*pair) for pair in zip(columns, added, strict=True)]
-        return self._within(pick, np.take_along_axis(every, order, axis=1), columns, merged(missed, added_miss), axes)
+        return self._within(pick, np.take_along_axis(every, order, axis=1), columns, merged(misses, added_miss), axes)
 
-    def _within(self, pick: Int, t: Array, columns: list[Array], missed: Array, axes: tuple[int, ...]) -> Sampled:
+    def _within(self, pick: Int, t: Array, columns: list[Array], misses: Array, axes: tuple[int, ...]) -> Sampled:
         """Values of all joints on their own branch axes before samples of some of the targets, at legal copies."""
-        present = missed <= tol.ACCEPTED**2
+        present = misses <= tol.ACCEPTED**2
         near = self.near[np.repeat(pick, t.shape[1])].T
         shape = (*axes, t.size)
         legal, cost, room = present, np.zeros(()), np.full(shape, 2 * np.pi)
@@ -164,7 +164,7 @@ class Follower(NamedTuple):
             legal, cost = legal & fits, cost + motion_of_joint(self.arm, j, columns[j], near[j])
             within_limits(self.arm, j, columns[j], room)
         room = np.where(present, room, np.nan)
-        every = (present, legal, room, np.where(present, cost, np.inf), missed)
+        every = (present, legal, room, np.where(present, cost, np.inf), misses)
         dense = (np.broadcast_to(x, shape).reshape(-1, *t.shape).transpose(1, 2, 0) for x in every)
         return Sampled(t, columns, axes, *dense)
 
@@ -190,10 +190,10 @@ class Follower(NamedTuple):
         return np.where(present[:, None], q, np.nan), legal & present
 
 
-def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[int, ...], t: Array) -> Array:
+def _values_between(arm: Arm, columns: list[Array], misses: Array, axes: tuple[int, ...], t: Array) -> Array:
     """Values of the joint between t (K,) that shall be asked, too (S, MAX_VALUES); inf where there are fewer.
 
-    columns: of each joint its values on its own branch axes before targets' samples (S K,); missed: squared.
+    columns: of each joint its values on its own branch axes before targets' samples (S K,); misses: squared.
     """
     K = len(t)
     shape = (*axes, columns[0].shape[-1] // K, K)
@@ -201,25 +201,25 @@ def _values_between(arm: Arm, columns: list[Array], missed: Array, axes: tuple[i
     def by_target(x: Array) -> Array:
         return x.reshape(*x.shape[:-1], *shape[-2:])
 
-    present = by_target(missed) <= tol.ACCEPTED**2
+    present = by_target(misses) <= tol.ACCEPTED**2
     room, may, crossed = np.full(shape, 2 * np.pi), np.zeros(shape, bool), np.zeros(shape, np.int8)
     for j, column in enumerate(columns):
-        left = np.full(column.shape, 2 * np.pi)
-        within_limits(arm, j, column, left)
-        left = by_target(left)
-        np.minimum(room, left, out=room)
-        may |= _may_touch(left)
-        crossed += (left < 0) != _next_sample(left < 0)
+        margins = np.full(column.shape, 2 * np.pi)
+        within_limits(arm, j, column, margins)
+        margins = by_target(margins)
+        np.minimum(room, margins, out=room)
+        may |= _may_touch(margins)
+        crossed += (margins < 0) != _next_sample(margins < 0)
     room = np.where(present, room, -np.inf)
     room = np.maximum(room, _next_sample(room))
-    gone = ~present & ~_next_sample(present)
+    absent = ~present & ~_next_sample(present)
     ends = present != _next_sample(present)
-    hidden = gone & _may_touch(np.sqrt(by_target(missed)))
-    limits = ~gone & ~ends & (may | (crossed > 1)) & (room > -LIMIT_SLACK)
-    often = (limits | (ends & (room > -END_SLACK)) | hidden).sum(axis=tuple(range(len(axes))))
-    most = np.argsort(-often, axis=1, kind="stable")[:, :MAX_WAYS]
-    begin = np.where(np.take_along_axis(often, most, axis=1) > 0, t[most], np.inf)
-    width = np.diff(t, append=t[0] + 2 * np.pi)[most]
+    hidden = absent & _may_touch(np.sqrt(by_target(misses)))
+    limits = ~absent & ~ends & (may | (crossed > 1)) & (room > -LIMIT_SLACK)
+    counts = (limits | (ends & (room > -END_SLACK)) | hidden).sum(axis=tuple(range(len(axes))))
+    ways = np.argsort(-counts, axis=1, kind="stable")[:, :MAX_WAYS]
+    begin = np.where(np.take_along_axis(counts, ways, axis=1) > 0, t[ways], np.inf)
+    width = np.diff(t, append=t[0] + 2 * np.pi)[ways]
     values = begin[:, :, None] + width[:, :, None] * (np.arange(1, PARTS) / PARTS)
     return np.asarray(values.reshape(-1, MAX_VALUES))
 
@@ -229,14 +229,14 @@ def _next_sample(x: NDArray[Any]) -> NDArray[Any]:
     return np.roll(x, -1, axis=-1)
 
 
-def _may_touch(left: Array) -> Bool:
-    """Whether what is left (..., K) may come to nothing and back between a sample and the next."""
-    touches, values, K = np.abs(_next_sample(left) - left) > FAST_STEP, left.ravel(), left.shape[-1]
-    near = np.flatnonzero(np.abs(values) < LIMIT_DISTANCE)
-    k = near % K
-    before, first, second, behind = (values[near - k + (k + offset) % K] for offset in (-1, 0, 1, 2))
-    step = second - first
-    bend = SAFE * np.maximum(np.abs(step - (first - before)), np.abs((behind - second) - step))
-    least = np.minimum(np.abs(first), np.abs(second))
-    touches.ravel()[near] |= (least < bend / 8) & (np.abs(step) < bend / 2)
+def _may_touch(margins: Array) -> Bool:
+    """Whether margins (..., K) may come to nothing and back between a sample and the next."""
+    touches, values, K = np.abs(_next_sample(margins) - margins) > FAST_STEP, margins.ravel(), margins.shape[-1]
+    index = np.flatnonzero(np.abs(values) < LIMIT_DISTANCE)
+    k = index % K
+    v0, v1, v2, v3 = (values[index - k + (k + offset) % K] for offset in (-1, 0, 1, 2))
+    step = v2 - v1
+    bend = SAFE * np.maximum(np.abs(step - (v1 - v0)), np.abs((v3 - v2) - step))
+    smallest = np.minimum(np.abs(v1), np.abs(v2))
+    touches.ravel()[index] |= (smallest < bend / 8) & (np.abs(step) < bend / 2)
     return touches

@@ -75,11 +75,11 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
         row[: len(minima)], branch[: len(minima)] = minima, np.arange(len(minima))
     batch.valid[...] = batch.within[...] = batch.branch >= 0
     q = batch.q.reshape(-1, arm.n)
-    missing = residual(task, fk(arm, q), q, np.repeat(goal, B, axis=0)).reshape(len(goal), B, 6)
-    angle = np.linalg.norm(missing[:, :, 3:], axis=2)
+    residuals = residual(task, fk(arm, q), q, np.repeat(goal, B, axis=0)).reshape(len(goal), B, 6)
+    angle = np.linalg.norm(residuals[:, :, 3:], axis=2)
     if B:
         batch.status[batch.valid[:, 0]] = Status.POSITION
-        miss = np.hypot(np.linalg.norm(missing[:, 0, :3], axis=1) / arm.reach, angle[:, 0])
+        miss = np.hypot(np.linalg.norm(residuals[:, 0, :3], axis=1) / arm.reach, angle[:, 0])
         batch.status[miss <= tol.SOLUTION] = Status.EXACT
     names = tuple(f"minimum {i + 1}" for i in range(B))
     text = names, METHOD, f"minima of the rotation angle at the position, from {STARTS} postures"
@@ -91,8 +91,8 @@ def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
     """The postures within limits nearest to the positions of targets (N, 4, 4); near: (n,)."""
     poses = closest.closest_each(arm, targets[:, :3, 3], "xyz", near=near)
     q = np.array([pose.q for pose in poses]).reshape(-1, arm.n)
-    missing = residual(task_for(arm, "pose"), fk(arm, q), q, targets)
-    return [replace(pose, angle=float(np.linalg.norm(m[3:]))) for pose, m in zip(poses, missing, strict=True)]
+    residuals = residual(task_for(arm, "pose"), fk(arm, q), q, targets)
+    return [replace(pose, angle=float(np.linalg.norm(m[3:]))) for pose, m in zip(poses, residuals, strict=True)]
 
 
 def _of_chunk(ik: Ik, arm: Arm, task: Task, target: Array, near: Array) -> list[Array]:
@@ -123,10 +123,10 @@ def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, ne
     """Minima (M, n) of one target, each once, by angle, then by motion from near (n,); the first ones are exact."""
     if not len(q):
         return q
-    missing = residual(task, fk(arm, q), q, np.broadcast_to(target, (len(q), 4, 4)))
-    angle, searched = np.linalg.norm(missing[:, 3:], axis=1), np.arange(len(q)) >= exact
-    good = (np.linalg.norm(missing[:, :3], axis=1) <= tol.SOLUTION * arm.reach) & ~outside_limits(arm, q).any(axis=1)
-    q, angle, searched = q[good], angle[good], searched[good]
+    residuals = residual(task, fk(arm, q), q, np.broadcast_to(target, (len(q), 4, 4)))
+    angle, searched = np.linalg.norm(residuals[:, 3:], axis=1), np.arange(len(q)) >= exact
+    valid = (np.linalg.norm(residuals[:, :3], axis=1) <= tol.SOLUTION * arm.reach) & ~outside_limits(arm, q).any(axis=1)
+    q, angle, searched = q[valid], angle[valid], searched[valid]
     motion = (np.abs(q - near) * np.where(arm.prismatic, 1.0, 180 / np.pi)).sum(axis=1)
     by_angle = np.argsort(angle, kind="stable")
     level = np.empty(len(q), int)  # angles that differ by rounding are one
@@ -134,13 +134,13 @@ def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, ne
     order = np.lexsort((motion.round(tol.EQUAL), searched, level))
     q, level = q[order], level[order]
     flat = flat_minima(arm, q, target)
-    chosen: list[int] = []
+    picked: list[int] = []
     for i in range(len(q)):
-        same = [j for j in chosen if level[j] == level[i]]
-        apart = newton.wrapped_distance(arm, q[same], q[i])
-        if not any(d <= tol.ONE_MINIMUM or (flat[i] and flat[j]) for d, j in zip(apart, same, strict=True)):
-            chosen.append(i)
-    return q[chosen]
+        equal = [j for j in picked if level[j] == level[i]]
+        gaps = newton.wrapped_distance(arm, q[equal], q[i])
+        if not any(d <= tol.ONE_MINIMUM or (flat[i] and flat[j]) for d, j in zip(gaps, equal, strict=True)):
+            picked.append(i)
+    return q[picked]
 
 
 @lru_cache(maxsize=16)
@@ -160,14 +160,14 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
     """Postures (M, n) at the targets' positions, within limits, and whose target each is (M,)."""
     pool, tips = _pool(arm)
     point = target[:, :3, 3]
-    apart = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
-    nearest = pool[np.argpartition(apart, NEAREST_POSTURES, axis=1)[:, :NEAREST_POSTURES]]
+    distances = (tips * tips).sum(axis=1) - 2.0 * (point @ tips.T)
+    nearest = pool[np.argpartition(distances, NEAREST_POSTURES, axis=1)[:, :NEAREST_POSTURES]]
     clipped = np.clip(near, arm.lower, arm.upper)[:, None]
     starts = np.concatenate([clipped, _farthest_apart(arm, nearest)], axis=1).reshape(-1, arm.n)
     row = np.repeat(np.arange(len(target)), STARTS + 1)
-    q, missed = _to_position(arm, box, starts, point[row], 24)
-    placed = missed <= tol.SOLUTION
-    return q[placed], row[placed]
+    q, misses = _to_position(arm, box, starts, point[row], 24)
+    in_position = misses <= tol.SOLUTION
+    return q[in_position], row[in_position]
 
 
 def _farthest_apart(arm: Arm, q: Array) -> Array:
@@ -175,35 +175,35 @@ def _farthest_apart(arm: Arm, q: Array) -> Array:
     u = q / arm.reach * np.pi
     places = np.concatenate([np.where(arm.prismatic, u, np.cos(q)), np.where(arm.prismatic, 0.0, np.sin(q))], axis=2)
     rows = np.arange(len(q))
-    taken = np.zeros((len(q), STARTS), int)
-    apart = np.full(q.shape[:2], np.inf)
+    picked = np.zeros((len(q), STARTS), int)
+    distances = np.full(q.shape[:2], np.inf)
     for k in range(1, STARTS):
-        away = places - places[rows, taken[:, k - 1]][:, None]
-        apart = np.minimum(apart, np.einsum("nki,nki->nk", away, away))
-        taken[:, k] = apart.argmax(axis=1)
-    return np.asarray(q[rows[:, None], taken])
+        change = places - places[rows, picked[:, k - 1]][:, None]
+        distances = np.minimum(distances, np.einsum("nki,nki->nk", change, change))
+        picked[:, k] = distances.argmax(axis=1)
+    return np.asarray(q[rows[:, None], picked])
 
 
 def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tuple[Array, Array]:
     """Projected Gauss-Newton of least norm onto positions (M, 3); also what is missed [reaches]."""
     q = q.copy()
     active = np.arange(len(q))
-    missed = np.full(len(q), np.inf)
+    misses = np.full(len(q), np.inf)
     for step in range(steps + 1):
         T, J = tip_and_jacobian(arm, q[active])
         c = (point[active] - T[:, :3, 3]) / arm.reach
-        missed[active] = np.linalg.norm(c, axis=1)
-        going = missed[active] > tol.SOLUTION * tol.SAME
-        active, c, J = active[going], c[going], J[going, :3] * box.unit / arm.reach
+        misses[active] = np.linalg.norm(c, axis=1)
+        is_open = misses[active] > tol.SOLUTION * tol.SAME
+        active, c, J = active[is_open], c[is_open], J[is_open, :3] * box.unit / arm.reach
         if step == steps or not len(active):
             break
-        move, stuck = _least_norm_steps(J, c), np.zeros((len(c), arm.n), bool)
+        move, stalled = _least_norm_steps(J, c), np.zeros((len(c), arm.n), bool)
         for _ in range(2):  # joints that would go beyond a limit stay on it
-            stuck |= ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
-            move = _least_norm_steps(np.where(stuck[:, None], 0.0, J), c)
+            stalled |= ((q[active] <= box.lower) & (move < 0)) | ((q[active] >= box.upper) & (move > 0))
+            move = _least_norm_steps(np.where(stalled[:, None], 0.0, J), c)
         move *= np.minimum(1.0, 0.5 / np.maximum(np.abs(move).max(axis=1), tol.TINY))[:, None]
         q[active] = np.clip(q[active] + move * box.unit, box.lower, box.upper)
-    return q, missed
+    return q, misses
 
 
 def _least_norm_steps(J: Array, c: Array) -> Array:

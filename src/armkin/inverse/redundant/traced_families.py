@@ -65,13 +65,13 @@ class Traced(NamedTuple):
         branch = np.arange(len(row)) - np.searchsorted(row, row)
         curve = np.zeros((N, int(branch.max(initial=0)) + 1), np.intp)
         curve[row, branch] = np.arange(len(row))
-        ways = Ways.between(follower, points, rows_of(points, after))
+        cubics = Ways.between(follower, points, rows_of(points, after))
         pieces, flags = none(follower.arm.n), np.zeros((2, N), bool)
-        curves = cls(follower, points, ways, np.repeat(row, count), begin, count, after, curve, pieces, *flags)
+        curves = cls(follower, points, cubics, np.repeat(row, count), begin, count, after, curve, pieces, *flags)
         if not len(points.step):
             return curves
         extent = np.zeros(N)
-        np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(ways.chord), begin, axis=0).max(axis=1))
+        np.maximum.at(extent, row, 0.5 * np.add.reduceat(np.abs(cubics.chord), begin, axis=0).max(axis=1))
         pieces = curves._nodes().of_curves(curves, row, branch)
         return curves._replace(pieces=pieces, short=(extent > 0) & (extent < tol.REACH))
 
@@ -88,16 +88,16 @@ class Traced(NamedTuple):
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
         follower, q = self.follower, q.copy()
         for _ in range(LAST):
-            missing, J = newton.scaled(follower.arm, follower.free.task, q, follower.target[pieces.row])
-            weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), missing[:, :, None])
+            residual, J = newton.scaled(follower.arm, follower.free.task, q, follower.target[pieces.row])
+            weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), residual[:, :, None])
             q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
         return q
 
-    def _between(self, point: Int, share: Array, enough: float = tol.PAIR_SETTLED) -> Points:
+    def _between(self, point: Int, share: Array, tolerance: float = tol.PAIR_SETTLED) -> Points:
         """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
-        ways = rows_of(self.ways, point)
-        last = np.where(ways.chord.any(axis=1, keepdims=True), ways.chord, self.points.tangent[point])
-        return onto_curves(self.follower, self.row[point], ways.at(self.follower, share), last, enough)
+        cubics = rows_of(self.ways, point)
+        last = np.where(cubics.chord.any(axis=1, keepdims=True), cubics.chord, self.points.tangent[point])
+        return onto_curves(self.follower, self.row[point], cubics.at(self.follower, share), last, tolerance)
 
     def _nodes(self) -> _Nodes:
         """Samples of all curves, and where something changes between them."""
@@ -105,61 +105,61 @@ class Traced(NamedTuple):
         point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
         part, samples = np.tile(parts, P), [self.ways.at(self.follower, u) for u in parts]
         q = np.stack(samples, axis=1).reshape(-1, arm.n)
-        up = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
+        rises = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
         alive = self.after[point] != point
         following = np.arange(1, len(point) + 1)
         following[PARTS - 1 :: PARTS] = PARTS * self.after
         legal: Bool = np.asarray(margin(arm, q) >= -SLACK)
-        next_legal, next_up = legal[following], up[following]
-        crosses, turns = (np.flatnonzero(alive & changed) for changed in (legal != next_legal, up != next_up))
-        crossing, turning = np.full(len(point), np.inf), np.full(len(point), np.inf)
-        crossing[crosses], crossed = self._crossing(point[crosses], part[crosses])
-        turning[turns], turned = self._turning(point[turns], part[turns])
+        next_legal, next_rises = legal[following], rises[following]
+        crosses, turns = (np.flatnonzero(alive & changed) for changed in (legal != next_legal, rises != next_rises))
+        cross_share, turn_share = np.full(len(point), np.inf), np.full(len(point), np.inf)
+        cross_share[crosses], cross_q = self._crossing(point[crosses], part[crosses])
+        turn_share[turns], turn_q = self._turning(point[turns], part[turns])
         cell = np.concatenate([np.arange(len(point)), crosses, turns])
-        share = np.concatenate([part, crossing[crosses], turning[turns]])
-        posture = np.concatenate([q, crossed, turned])
+        share = np.concatenate([part, cross_share[crosses], turn_share[turns]])
+        posture = np.concatenate([q, cross_q, turn_q])
         order = np.lexsort((share, cell))
         cell, share = cell[order], share[order]
         return _Nodes(
             point[cell] + share, posture[order],
-            np.where(crossing[cell] <= share, next_legal[cell], legal[cell]) & alive[cell],
-            np.where(turning[cell] <= share, next_up[cell], up[cell]), alive[cell],
+            np.where(cross_share[cell] <= share, next_legal[cell], legal[cell]) & alive[cell],
+            np.where(turn_share[cell] <= share, next_rises[cell], rises[cell]), alive[cell],
         )  # fmt: skip
 
     def _crossing(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which a limit is crossed, and the postures there: its joint is held on it."""
-        arm, ways = self.follower.arm, rows_of(self.ways, point)
-        share = _find_root(lambda t: margin(arm, ways.at(self.follower, t)), low, low + 1.0 / PARTS)
-        guess = ways.at(self.follower, share)
+        arm, cubics = self.follower.arm, rows_of(self.ways, point)
+        share = _find_root(lambda t: margin(arm, cubics.at(self.follower, t)), low, low + 1.0 / PARTS)
+        guess = cubics.at(self.follower, share)
         free = (arm.upper - arm.lower == np.inf) | (~arm.prismatic & (arm.upper - arm.lower >= 2 * np.pi))
         low, high = np.where(free, 0.0, arm.lower), np.where(free, 0.0, arm.upper)
-        away = guess - 0.5 * (low + high)
-        away = np.where(arm.prismatic, away, wrap_angle(away))
-        room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(away))
+        offset = guess - 0.5 * (low + high)
+        offset = np.where(arm.prismatic, offset, wrap_angle(offset))
+        room = np.where(free, np.inf, 0.5 * (high - low) - np.abs(offset))
         joint, index = room.argmin(axis=1), np.arange(len(point))
-        held = np.zeros_like(guess)
-        held[index, joint] = 1.0
-        guess[index, joint] += np.sign(away[index, joint]) * room[index, joint]
-        points = onto_curves(self.follower, self.row[point], guess, held)
-        good = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
-        touching = np.flatnonzero(~good)  # the joint touches its limit alone
+        fixed = np.zeros_like(guess)
+        fixed[index, joint] = 1.0
+        guess[index, joint] += np.sign(offset[index, joint]) * room[index, joint]
+        points = onto_curves(self.follower, self.row[point], guess, fixed)
+        valid = points.settled & (np.abs(points.q - guess).max(axis=1, initial=0.0) < tol.REACH)
+        touching = np.flatnonzero(~valid)  # the joint touches its limit alone
         points.q[touching] = self._between(point[touching], share[touching]).q
         return share, points.q
 
     def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
-        j, ways = self.follower.free.joint, rows_of(self.ways, point)
-        share = _find_root(lambda t: ways.slope(t, j), low, low + 1.0 / PARTS)
+        j, arcs = self.follower.free.joint, rows_of(self.ways, point)
+        share = _find_root(lambda t: arcs.slope(t, j), low, low + 1.0 / PARTS)
         end = self._between(point, share)
-        size = np.maximum(np.sqrt((ways.begin**2).sum(axis=1)), tol.TINY)
-        bend = (ways.slope(share + WAY, j) - ways.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
+        size = np.maximum(np.sqrt((arcs.begin**2).sum(axis=1)), tol.TINY)
+        bend = (arcs.slope(share + WAY, j) - arcs.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
         for _ in range(TURNS if len(point) else 0):
             step = -end.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf)
             step = np.clip(step, -tol.REACH * size, tol.REACH * size)
-            ahead = end.q + step[:, None] * end.tangent * radian_or_reach(self.follower.arm)
-            after = onto_curves(self.follower, self.row[point], ahead, end.tangent)
-            bend = np.where(step == 0.0, bend, (after.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
-            end = after
+            predicted = end.q + step[:, None] * end.tangent * radian_or_reach(self.follower.arm)
+            point1 = onto_curves(self.follower, self.row[point], predicted, end.tangent)
+            bend = np.where(step == 0.0, bend, (point1.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
+            end = point1
         return share, end.q
 
 
@@ -168,8 +168,8 @@ def _find_root(value: Callable[[Array], Array], lo: Array, hi: Array) -> Array:
     at_lo, at_hi = value(lo), value(hi)
     share, side = 0.5 * (lo + hi), np.zeros(len(lo))
     for _ in range(SECANTS if len(lo) else 0):
-        apart = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
-        share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / apart)
+        difference = np.where(at_hi == at_lo, 1.0, at_hi - at_lo)
+        share = np.where(at_hi == at_lo, 0.5 * (lo + hi), (lo * at_hi - hi * at_lo) / difference)
         share = np.clip(share, lo, hi)
         middle = value(share)
         low = (middle >= 0) == (at_lo >= 0)
@@ -196,21 +196,21 @@ class _Nodes(NamedTuple):
         q, fits = nearest_row(curves.follower.arm, self.q, near)
         cost = motion(curves.follower.arm, q, near)
         costs = np.concatenate([cost[node], np.where(fits, cost, np.inf)[node]])
-        best = best_samples(costs, curve + len(row) * legal, first, length + 1)
+        best_sample = best_samples(costs, curve + len(row) * legal, first, length + 1)
         a, b = _ends_of_pieces(self.q[node, curves.follower.free.joint], curve, first, length)
 
         def parameter(sample: Int) -> Array:
             return np.asarray(value[curve, sample % K] + curves.counts[curve] * (sample // K))
 
-        best_at, last = first + best, first + length
+        best_at, last = first + best_sample, first + length
         pieces = Pieces(
             row=row[curve], branch=branch[curve], legal=legal, a=a, b=b, first=parameter(first), last=parameter(last),
             low=parameter(np.maximum(best_at - 1, first)), at=parameter(best_at),
             high=parameter(np.minimum(best_at + 1, last)), start=q[node[curve, best_at % K]],
         )  # fmt: skip
         exact, allowed = curves.at(pieces, pieces.at)
-        inside = (best > 0) & (best < length) & (allowed | ~legal)
-        return pieces._replace(start=np.where(inside[:, None], exact, pieces.start))
+        is_inner = (best_sample > 0) & (best_sample < length) & (allowed | ~legal)
+        return pieces._replace(start=np.where(is_inner[:, None], exact, pieces.start))
 
     def _table(self, curves: Traced) -> tuple[Int, Array]:
         """The nodes of curves C, a row each (C, K), and their parameters; the last one is repeated, at the parameter
@@ -226,8 +226,8 @@ class _Nodes(NamedTuple):
     def _runs(self, node: Int) -> tuple[Int, Int, Int, Bool]:
         """Runs of nodes (C, K) along which the joint does not turn back, legal ones and those that hold no legal node:
         their curves, first nodes, lengths, and whether legal."""
-        legal, up = self.legal[node], self.up[node]
-        turns = up != np.roll(up, 1, axis=1)
+        legal, rises = self.legal[node], self.up[node]
+        turns = rises != np.roll(rises, 1, axis=1)
         of_legal, others = runs(legal, turns), runs(self.alive[node], turns)
         empty = holding_none(legal, *others)
         curve, first, length = (np.append(x, y[empty]) for x, y in zip(of_legal, others, strict=True))

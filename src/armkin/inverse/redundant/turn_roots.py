@@ -40,13 +40,13 @@ def _cells(degree: int) -> tuple[Array, float, Array]:
     """Middles of cells (C,), half their width, and the Taylor coefficients there, for one half, of a polynomial by the
     real and the imaginary parts of its coefficients: (2 degree + 2, C TERMS)."""
     count = math.ceil(np.pi * degree / CELL_WIDTH)
-    middle, half = -np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count), np.pi / count
+    middle, half_width = -np.pi + (np.arange(count) + 0.5) * (2 * np.pi / count), np.pi / count
     k, order = np.arange(degree + 1), np.arange(TERMS)
-    factor = (1j * k[:, None] * half) ** order / np.array([math.factorial(i) for i in order])
+    factor = (1j * k[:, None] * half_width) ** order / np.array([math.factorial(i) for i in order])
     factor[1:] *= 2.0  # the factor of -k is the conjugate
     wave = np.exp(1j * k[:, None] * middle)[:, :, None] * factor[:, None]  # (k, C, TERMS)
     series: Array = np.concatenate([wave.real, -wave.imag])
-    return np.asarray(middle), half, series.reshape(2 * degree + 2, -1)
+    return np.asarray(middle), half_width, series.reshape(2 * degree + 2, -1)
 
 
 @lru_cache(maxsize=8)
@@ -74,35 +74,35 @@ def sampled_at(degree: int) -> NDArray[np.complex128]:
 
 def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     """The real roots of polynomials from their values (F, M) at `sampled_at`."""
-    middle, half, series = _cells(degree)
+    middle, half_width, series = _cells(degree)
     F, order = len(values), np.arange(TERMS)
     c = values @ _coefficients(degree)
     # the coefficients' errors shrink with their order, as the samples lie off the real line
-    c, above = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(SHIFT * np.arange(degree + 1, degree + TAIL + 1))
-    slack = SAFE * (2 * degree + 1) * above.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
+    c, tail = c[:, : degree + 1], np.abs(c[:, degree + 1 :]) * np.exp(SHIFT * np.arange(degree + 1, degree + TAIL + 1))
+    slack = SAFE * (2 * degree + 1) * tail.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
     index, angle = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
     found_which, found_at, decided = [], [], np.ones(F, bool)
     for _ in range(HALVINGS):
         sizes, blur = np.abs(a), slack[index]
-        open_ = np.flatnonzero(sizes[:, 0] <= sizes[:, 1:].sum(axis=1) + blur)
-        a, index, angle = a[open_], index[open_], angle[open_]
-        sizes, blur = sizes[open_], blur[open_]
+        candidates = np.flatnonzero(sizes[:, 0] <= sizes[:, 1:].sum(axis=1) + blur)
+        a, index, angle = a[candidates], index[candidates], angle[candidates]
+        sizes, blur = sizes[candidates], blur[candidates]
         single = sizes[:, 1] > (sizes[:, 2:] * order[2:]).sum(axis=1) + TERMS * blur
         ends = a[:, ::2].sum(axis=1)[:, None] + a[:, 1::2].sum(axis=1)[:, None] * np.array([-1.0, 1.0])
         touches = (ends[:, 0] * ends[:, 1] <= 0.0) | (np.abs(ends).min(axis=1) <= blur)
         simple = np.flatnonzero(single & touches)
         found_which.append(index[simple])
-        found_at.append(angle[simple] + half * _zero_of_series(a[simple]))
+        found_at.append(angle[simple] + half_width * _zero_of_series(a[simple]))
         noise = ~single & (sizes[:, 1:].sum(axis=1) <= TERMS * blur)
         decided[index[noise]] = False
         found_which.append(index[noise])
         found_at.append(angle[noise])
-        left = np.flatnonzero(~single & ~noise)
-        half *= 0.5
-        a = (a[left] @ _halving_matrices()).reshape(-1, TERMS)
-        angle = (angle[left] + half * np.array([[-1.0], [1.0]])).ravel()
-        index = np.tile(index[left], 2)
+        divided = np.flatnonzero(~single & ~noise)
+        half_width *= 0.5
+        a = (a[divided] @ _halving_matrices()).reshape(-1, TERMS)
+        angle = (angle[divided] + half_width * np.array([[-1.0], [1.0]])).ravel()
+        index = np.tile(index[divided], 2)
         if not len(index):
             break
     decided[index] = False
