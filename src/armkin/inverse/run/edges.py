@@ -49,18 +49,18 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
             narrow = rows[part]
             doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
             doubts.second[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
-        left, tight, first, second, loose, _, at_ends, _, simple = rows_of(doubts, pending)
+        batch_rows, tight, first, second, loose, _, has_free_ends, _, simple = rows_of(doubts, pending)
         # seeds with the preferred values for free joints, and those that other values change
         seed_sets = [first, second] if loose.any() else [first]
         if runner.geometry.ends:
             is_loose: Bool = np.asarray(loose.any(axis=1))
             seed_sets.append(np.where(is_loose[:, None, None], tight, np.nan))
             unsettled = np.zeros(len(target), bool)
-            unsettled[left[at_ends]], batch.complete[left[at_ends]] = True, False
+            unsettled[batch_rows[has_free_ends]], batch.complete[batch_rows[has_free_ends]] = True, False
         label = np.tile(np.arange(loose.shape[1]), len(seed_sets))
         if len(seed_sets) > 1:
-            fixed = np.zeros((len(loose), (len(seed_sets) - 1) * loose.shape[1]), bool)
-            loose, simple = (np.concatenate([x, fixed], axis=1) for x in (loose, simple))
+            padding = np.zeros((len(loose), (len(seed_sets) - 1) * loose.shape[1]), bool)
+            loose, simple = (np.concatenate([x, padding], axis=1) for x in (loose, simple))
         seeds = Seeds.of(np.concatenate(seed_sets, axis=1), label, loose, simple)
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(pending), seeds)]
     elif runner.geometry.ends:
@@ -72,9 +72,9 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
 
 def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
     """The targets whose self-motions have a closed form, with their seeds."""
-    settled: list[tuple[Int, Seeds]] = []
+    decided: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):
-        return settled
+        return decided
     part = np.flatnonzero(doubts.free & ~doubts.ends)
     q = np.stack([doubts.first[part], doubts.second[part]], axis=1)
     for _ in range(2):
@@ -85,30 +85,30 @@ def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[
         B = np.arange(loose.shape[1])
         column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
         ordered = np.take_along_axis(q, column[:, None, :, None], axis=2)
-        linked = linkages.settle(subset, ordered, np.take_along_axis(loose, column, axis=1))
-        if len(rows := np.flatnonzero(linked.known)):
+        linkage = linkages.settle(subset, ordered, np.take_along_axis(loose, column, axis=1))
+        if len(rows := np.flatnonzero(linkage.known)):
             # postures of known self-motions and candidates that are not loose, sorted by labels
-            whose, present = part[rows], ~np.isnan(linked.q[rows, :, 0])
-            places = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max())]
-            fixed = np.where(loose[rows][:, :, None], np.nan, doubts.first[whose])
-            label = np.take_along_axis(np.tile(column[rows], q.shape[1]), places, axis=1)
+            k, present = part[rows], ~np.isnan(linkage.q[rows, :, 0])
+            slot = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max())]
+            fixed_q = np.where(loose[rows][:, :, None], np.nan, doubts.first[k])
+            label = np.take_along_axis(np.tile(column[rows], q.shape[1]), slot, axis=1)
             label = np.concatenate([np.broadcast_to(B, loose[rows].shape), label], axis=1)
             order = np.argsort(label, axis=1, kind="stable")
-            curve, joints = (np.take_along_axis(x[rows], places[:, :, None], axis=1) for x in (linked.q, linked.joints))
-            motion = np.concatenate([np.zeros(fixed.shape, bool), joints], axis=1)
+            curve, joints = (np.take_along_axis(x[rows], slot[:, :, None], axis=1) for x in (linkage.q, linkage.joints))
+            moving = np.concatenate([np.zeros(fixed_q.shape, bool), joints], axis=1)
             seeds = Seeds(
-                q=np.take_along_axis(np.concatenate([fixed, curve], axis=1), order[:, :, None], axis=1),
+                q=np.take_along_axis(np.concatenate([fixed_q, curve], axis=1), order[:, :, None], axis=1),
                 loose=np.zeros(order.shape, bool),
                 label=np.take_along_axis(label, order, axis=1),
-                sure=np.take_along_axis(motion, order[:, :, None], axis=1),
-                simple=np.take_along_axis(np.pad(doubts.simple[whose], ((0, 0), (0, places.shape[1]))), order, axis=1),
+                sure=np.take_along_axis(moving, order[:, :, None], axis=1),
+                simple=np.take_along_axis(np.pad(doubts.simple[k], ((0, 0), (0, slot.shape[1]))), order, axis=1),
             )
-            settled.append((whose, seeds))
-        unknown = np.flatnonzero(linked.lacking)
+            decided.append((k, seeds))
+        unknown = np.flatnonzero(linkage.lacking)
         part, q = part[unknown], q[unknown]
         if len(part):
             q = np.concatenate([q, runner.samples(subset.target[unknown], subset.near[unknown])], axis=1)
-    return settled
+    return decided
 
 
 def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
@@ -137,14 +137,14 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         first, second, solved = _candidates_at_two(runner, goal, reference, reference + 1.0)
         differences = np.abs(first - second)
         changed = ~((differences.max(axis=2) < tol.SAME) | is_plain[part])
-        lost = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
-        if len(lost):  # only some values of the free joints, or one, have solutions
-            shift, single = runner.best_shift(goal[lost], reference[lost], changed[lost])
-            best = reference[lost] + shift
-            first[lost], second[lost], solved = _candidates_at_two(runner, goal[lost], best, best + tol.FOLD_WAY)
-            doubts.narrow[part[lost]] = solved[1].any(axis=1)
-            single &= ~doubts.narrow[part[lost]]
-            doubts.free[part[lost]], second[lost[single]] = ~single, np.nan  # one possible value is no freedom
+        k = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
+        if len(k):  # only some values of the free joints, or one, have solutions
+            shift, single = runner.best_shift(goal[k], reference[k], changed[k])
+            best = reference[k] + shift
+            first[k], second[k], solved = _candidates_at_two(runner, goal[k], best, best + tol.FOLD_WAY)
+            doubts.narrow[part[k]] = solved[1].any(axis=1)
+            single &= ~doubts.narrow[part[k]]
+            doubts.free[part[k]], second[k[single]] = ~single, np.nan  # one possible value is no freedom
         doubts.first[part] = np.where(is_plain[part][:, :, None], doubts.first[part], first)
         doubts.second[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         differences = np.minimum(differences, np.abs(differences - 2 * np.pi))[:, :, list(runner.geometry.ends)]

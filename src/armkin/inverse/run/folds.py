@@ -53,55 +53,55 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
     if len(k):
         doubted.q[k, b], size = newton.correct(arm, task, doubted.q[k, b], target[doubted.rows[k]], steps=3)
         decided[k[size >= tol.CLOSED]] = False
-    second = _second_of_pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
-    meets: Bool = np.asarray(second.any(axis=1))
-    listed = np.flatnonzero(decided & (meets | (solving & (doubted.miss > tol.ACCEPTED**2)).any(axis=1)))
+    is_second = _second_of_pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
+    pairs: Bool = np.asarray(is_second.any(axis=1))
+    listed = np.flatnonzero(decided & (pairs | (solving & (doubted.miss > tol.ACCEPTED**2)).any(axis=1)))
     if len(listed):
-        rows, meets, solving = doubted.rows[listed], meets[listed], solving[listed] & ~second[listed]
-        if meets.any():
-            doubted.q[listed[meets]] = as_rows(runner.in_numbers(target[rows[meets]]), meets.sum())[:, :, : arm.n]
+        rows, pairs, solving = doubted.rows[listed], pairs[listed], solving[listed] & ~is_second[listed]
+        if pairs.any():
+            doubted.q[listed[pairs]] = as_rows(runner.in_numbers(target[rows[pairs]]), pairs.sum())[:, :, : arm.n]
         order = np.argsort(~solving, axis=1, kind="stable")
         valid = np.take_along_axis(solving, order, axis=1)
         q = np.where(valid[:, :, None], np.take_along_axis(doubted.q[listed], order[:, :, None], axis=1), np.nan)
         write_branches(arm, batch, rows, q, valid, order, near[rows])
-        batch.status[rows] = np.where(meets, Status.BOUNDARY, Status.EXACT)
+        batch.status[rows] = np.where(pairs, Status.BOUNDARY, Status.EXACT)
     return doubted.rows[~decided]
 
 
 def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
     """Which near roots (K, B) are the second of two that meet; clears `decided` (K,) where the curvature is not
     conclusive."""
-    second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
+    is_second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
     k, b = np.nonzero(near_roots)
     if not len(k):
-        return second
-    q, number = doubted.q[k, b], np.empty(near_roots.shape, int)
-    number[k, b] = np.arange(len(k))
+        return is_second
+    q, index = doubted.q[k, b], np.empty(near_roots.shape, int)
+    index[k, b] = np.arange(len(k))
     row, i, j = np.nonzero(np.triu(near_roots[:, :, None] & near_roots[:, None], 1))
-    i, j = number[row, i], number[row, j]
+    i, j = index[row, i], index[row, j]
     step = newton.difference(goals.arm, q[j], q[i])
-    close = np.abs(step).max(axis=1) < tol.CLOSE_BY
-    partners = np.bincount(np.concatenate([i[close], j[close]]), minlength=len(k))
+    is_close = np.abs(step).max(axis=1) < tol.CLOSE_BY
+    partners = np.bincount(np.concatenate([i[is_close], j[is_close]]), minlength=len(k))
     decided[k[partners > 1]] = False
     if not decided[k].all():  # without Jacobians of undecided targets
         return _second_of_pairs(goals, doubted, near_roots, decided)
-    i, j, step = i[close], j[close], step[close]
-    double = np.abs(step).max(axis=1) < PAIR_DISTANCE
+    i, j, step = i[is_close], j[is_close], step[is_close]
+    is_double = np.abs(step).max(axis=1) < PAIR_DISTANCE
     inverse, beside = _bordered_inverses(goals, q)
-    weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
-    partners[i[double]], weak[i[double]] = 0, True  # the first root of a double one represents both
-    lone = np.flatnonzero(weak & (partners == 0) & decided[k])
-    if len(lone):
-        isolated, turns = _by_curvature(goals, q[lone], inverse[lone], beside[lone])
-        decided[k[lone[~np.where(np.isin(lone, i[double]), turns, isolated)]]] = False
-        second[k[j[double]], b[j[double]]] = True
-        i, j, step = i[~double], j[~double], step[~double]
+    is_weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
+    partners[i[is_double]], is_weak[i[is_double]] = 0, True  # the first root of a double one represents both
+    single = np.flatnonzero(is_weak & (partners == 0) & decided[k])
+    if len(single):
+        isolated, turns = _by_curvature(goals, q[single], inverse[single], beside[single])
+        decided[k[single[~np.where(np.isin(single, i[is_double]), turns, isolated)]]] = False
+        is_second[k[j[is_double]], b[j[is_double]]] = True
+        i, j, step = i[~is_double], j[~is_double], step[~is_double]
     if len(i):
-        ends = inverse[j] if not beside.shape[2] else _bordered_inverses(goals, q[j], beside[i])[0]
-        alone, meet = _decide_by_cubic(step, inverse[i], ends)
-        decided[k[i[~(alone | meet)]]] = False
-        second[k[j[meet]], b[j[meet]]] = True
-    return second
+        end_inverse = inverse[j] if not beside.shape[2] else _bordered_inverses(goals, q[j], beside[i])[0]
+        stands_alone, meets = _decide_by_cubic(step, inverse[i], end_inverse)
+        decided[k[i[~(stands_alone | meets)]]] = False
+        is_second[k[j[meets]], b[j[meets]]] = True
+    return is_second
 
 
 def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
@@ -124,29 +124,29 @@ def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> t
     return newton.nudged(np.linalg.inv, np.concatenate([J, beside], axis=2)), beside
 
 
-def _decide_by_cubic(way: Array, first: Array, second: Array) -> tuple[Bool, Bool]:
-    """Which of P pairs with differences `way` (P, n) stand alone, and which meet, (P,), by inverses of their Jacobians.
+def _decide_by_cubic(offset: Array, inverse: Array, end_inverse: Array) -> tuple[Bool, Bool]:
+    """Which of P pairs with an offset (P, n) stand alone, and which meet, (P,), by inverses of their Jacobians.
 
     The residual g along u is 0 at both ends; its slope on a curve that keeps all other numbers of the target is
     1 / (v' J^-1 u).
     """
-    d = np.sqrt((way * way).sum(axis=1))
-    v = _bordered_rows(way / np.maximum(d, PAIR_DISTANCE)[:, None], first)
-    u = _unit_rows(v @ first)
+    d = np.sqrt((offset * offset).sum(axis=1))
+    v = _bordered_rows(offset / np.maximum(d, PAIR_DISTANCE)[:, None], inverse)
+    u = _unit_rows(v @ inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lost, lost_second = first @ u.swapaxes(1, 2), second @ u.swapaxes(1, 2)
-        rise, fall = 1.0 / (v @ lost)[:, 0, 0], 1.0 / (v @ lost_second)[:, 0, 0]
-        size, bend, uneven = np.abs(rise - fall), np.abs(fall - rise) / d, np.abs(rise + fall)
+        column, end_column = inverse @ u.swapaxes(1, 2), end_inverse @ u.swapaxes(1, 2)
+        rise, fall = 1.0 / (v @ column)[:, 0, 0], 1.0 / (v @ end_column)[:, 0, 0]
+        size, bend, asymmetry = np.abs(rise - fall), np.abs(fall - rise) / d, np.abs(rise + fall)
         # assume the fourth derivative of the sharpest fold
-        plain = _one_direction_lost(first, lost, u) & (d > PAIR_DISTANCE) & (uneven < SYMMETRIC * size)
-        lone = plain & (0.125 * d * size - tol.CURVATURE * d**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
+        is_conclusive = _one_direction_lost(inverse, column, u) & (d > PAIR_DISTANCE) & (asymmetry < SYMMETRIC * size)
+        stands_alone = is_conclusive & (0.125 * d * size - tol.CURVATURE * d**4 / 384.0 > SURE_FACTOR * tol.SOLUTION)
         # where two branches that meet may have a residual of 2 SOLUTION
-        end = d + 2.0 * np.sqrt(tol.SOLUTION / bend)
-        is_straight = 6.0 * uneven / d**2 * end + 0.5 * tol.CURVATURE * end**2 < SYMMETRIC * bend
+        reach = d + 2.0 * np.sqrt(tol.SOLUTION / bend)
+        is_straight = 6.0 * asymmetry / d**2 * reach + 0.5 * tol.CURVATURE * reach**2 < SYMMETRIC * bend
         # the direction in which no joint moves the tool counts as well
-        sideways = np.abs(lost_second[:, way.shape[1] :, 0] * fall[:, None]).sum(axis=1)
-        meet = plain & is_straight & (0.125 * d * (size + sideways) < tol.SOLUTION / SURE_FACTOR)
-    return np.asarray(lone), np.asarray(meet)
+        sideways = np.abs(end_column[:, offset.shape[1] :, 0] * fall[:, None]).sum(axis=1)
+        meets = is_conclusive & is_straight & (0.125 * d * (size + sideways) < tol.SOLUTION / SURE_FACTOR)
+    return np.asarray(stands_alone), np.asarray(meets)
 
 
 def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tuple[Bool, Bool]:
@@ -155,25 +155,26 @@ def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tupl
     n = q.shape[1]
     # the columns of J^-1 are nearly along the lost direction v, the longest one most
     joint_rows = inverse[:, :n]
-    largest = (joint_rows * joint_rows).sum(axis=1).argmax(axis=1)
-    v = np.take_along_axis(joint_rows, largest[:, None, None], axis=2)
+    longest = (joint_rows * joint_rows).sum(axis=1).argmax(axis=1)
+    v = np.take_along_axis(joint_rows, longest[:, None, None], axis=2)
     v = _unit_rows((joint_rows @ (joint_rows.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]
-    way = tol.FOLD_WAY * v * radian_or_reach(goals.arm)
-    ends, _ = _bordered_inverses(goals, np.concatenate([q + way, q - way]), np.concatenate([beside, beside]))
+    step = tol.FOLD_WAY * v * radian_or_reach(goals.arm)
+    end_inverses, _ = _bordered_inverses(goals, np.concatenate([q + step, q - step]), np.concatenate([beside, beside]))
     v = _bordered_rows(v, inverse)
     u = _unit_rows(v @ inverse)
     with np.errstate(divide="ignore", invalid="ignore"):
-        lost, at_ends = inverse @ u.swapaxes(1, 2), ends @ np.concatenate([u, u]).swapaxes(1, 2)
-        slope = 1.0 / (v @ lost)[:, 0, 0]
-        rise, fall = (1.0 / (np.concatenate([v, v]) @ at_ends)[:, 0, 0]).reshape(2, -1)
-        bend, passed = np.abs(rise - fall) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / np.abs(slope)
+        column, end_columns = inverse @ u.swapaxes(1, 2), end_inverses @ np.concatenate([u, u]).swapaxes(1, 2)
+        slope = 1.0 / (v @ column)[:, 0, 0]
+        rise, fall = (1.0 / (np.concatenate([v, v]) @ end_columns)[:, 0, 0]).reshape(2, -1)
+        bend, exit_distance = np.abs(rise - fall) / (2.0 * tol.FOLD_WAY), 2.0 * tol.SOLUTION / np.abs(slope)
         third = np.abs(rise + fall - 2.0 * slope) / tol.FOLD_WAY**2
-        most = bend + third * passed + 0.5 * tol.CURVATURE * passed**2
-        sharp = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * most
-        end = 4.0 * np.sqrt(tol.SOLUTION / bend)
-        level = (np.abs(rise + fall) < SYMMETRIC * np.abs(rise - fall)) & (slope**2 < tol.SOLUTION * bend)
-    one, square = _one_direction_lost(inverse, lost, u), beside.shape[2] == 0
-    return np.asarray(one & (passed < tol.FOLD_WAY) & sharp), np.asarray(one & (end < tol.FOLD_WAY) & level & square)
+        bend_limit = bend + third * exit_distance + 0.5 * tol.CURVATURE * exit_distance**2
+        is_root = slope**2 > SURE_FACTOR * 2.0 * tol.SOLUTION * bend_limit
+        turn_distance = 4.0 * np.sqrt(tol.SOLUTION / bend)
+        is_boundary = (np.abs(rise + fall) < SYMMETRIC * np.abs(rise - fall)) & (slope**2 < tol.SOLUTION * bend)
+    loses_one, is_square = _one_direction_lost(inverse, column, u), beside.shape[2] == 0
+    is_root &= loses_one & (exit_distance < tol.FOLD_WAY)
+    return np.asarray(is_root), np.asarray(loses_one & (turn_distance < tol.FOLD_WAY) & is_boundary & is_square)
 
 
 def _bordered_rows(v: Array, inverse: Array) -> Array:
@@ -188,7 +189,7 @@ def _unit_rows(rows: Array) -> Array:
         return np.asarray(rows / np.sqrt((rows * rows).sum(axis=2, keepdims=True)))
 
 
-def _one_direction_lost(inverse: Array, lost: Array, u: Array) -> Bool:
-    """Whether only one direction is lost, by an upper bound of the inverse in all others; lost: J^-1 u."""
-    remaining = inverse - lost @ u
+def _one_direction_lost(inverse: Array, column: Array, u: Array) -> Bool:
+    """Whether only one direction is lost, by an upper bound of the inverse in all others; column: J^-1 u."""
+    remaining = inverse - column @ u
     return np.asarray((remaining * remaining).sum(axis=(1, 2)) * tol.HIGH**2 < 1.0)

@@ -50,9 +50,8 @@ def examine(
         wants_more = retry | state.moved.any(axis=1) & (last - first > 2)
     else:
         wants_more = retry | unsettled | (state.status != Status.EXACT)
-    if not wants_more.any():
+    if not len(rows := np.flatnonzero(wants_more)):
         return state._replace(again=retry)
-    rows = np.flatnonzero(wants_more)
     lost = retry if incomplete is None else retry | incomplete
     more_candidates, labels, wants_starts = more(goals.target[rows], goals.near[rows], lost[rows])
     if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
