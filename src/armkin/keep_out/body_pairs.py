@@ -67,9 +67,9 @@ class Guard:
                 np.minimum.reduceat(shape.distance(begin, end) - body_radius, self.first) for _, shape in self.obstacles
             ]
         if len(self.ours):
-            later, earlier = self.ours, self.theirs
-            distance = segment_distance(a[:, later], b[:, later], a[:, earlier], b[:, earlier])
-            distance -= (radius[owner[later]] + radius[owner[earlier]])[:, None]
+            i, j = self.ours, self.theirs
+            distance = segment_distance(a[:, i], b[:, i], a[:, j], b[:, j])
+            distance -= (radius[owner[i]] + radius[owner[j]])[:, None]
             parts.append(np.minimum.reduceat(distance, self.starts))
         return np.concatenate(parts) if parts else np.empty((0, len(q)))
 
@@ -110,13 +110,13 @@ class Guard:
         middle, direction = (a + b) / 2, b - a
         half_length = np.sqrt(np.einsum("ksn,ksn->sn", direction, direction)) / 2
         radius, moving = self._segment_radius[:, None], self.moving
-        later, earlier = self.ours, self.theirs
+        i, j = self.ours, self.theirs
         distances = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
         half_lengths = [half_length[moving]] * len(distances)
-        if len(later):
-            offset = middle[:, later] - middle[:, earlier]
-            distances.append(np.sqrt(np.einsum("ksn,ksn->sn", offset, offset)) - radius[later] - radius[earlier])
-            half_lengths.append(half_length[later] + half_length[earlier])
+        if len(i):
+            offset = middle[:, i] - middle[:, j]
+            distances.append(np.sqrt(np.einsum("ksn,ksn->sn", offset, offset)) - radius[i] - radius[j])
+            half_lengths.append(half_length[i] + half_length[j])
         return distances, half_lengths
 
     def _exact_distances(self, k: int, a: Array, b: Array, rows: NDArray[np.intp], poses: NDArray[np.intp]) -> Array:
@@ -156,7 +156,7 @@ def guard(arm: Arm) -> Guard:
         return _guard_of_pairs(arm, obstacles, [], ())
     form = bodies(arm)
     existing = [body for body in range(arm.n + 1) if form.exists(body)]
-    pairs = [(later, earlier) for later in existing for earlier in existing if later - earlier >= 2]
+    pairs = [(i, j) for i in existing for j in existing if i - j >= 2]
     maxima = _guard_of_pairs(arm, (), pairs, ()).distances(sample_postures(arm)).max(axis=0, initial=-np.inf)
     possible_pairs = [pair for pair, greatest in zip(pairs, maxima, strict=True) if greatest >= 0.0]
     left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in possible_pairs)
@@ -175,7 +175,7 @@ def _guard_of_pairs(
     moving = np.flatnonzero(np.isin(arm_bodies.owner, solid))
     segments = [np.flatnonzero(arm_bodies.owner == body) for body in range(arm.n + 1)]
     segment_pairs = [[(i, j) for i in segments[later] for j in segments[earlier]] for later, earlier in pairs]
-    joined = np.array([segment_pair for part in segment_pairs for segment_pair in part], dtype=np.intp).reshape(-1, 2)
+    rows = np.array([segment_pair for part in segment_pairs for segment_pair in part], dtype=np.intp).reshape(-1, 2)
     sizes = [len(part) for part in segment_pairs]
     named_pairs = [Pair(body, None, name) for name, _ in obstacles for body in solid]
     named_pairs += [Pair(later, earlier, arm_bodies.names[earlier]) for later, earlier in pairs]
@@ -187,8 +187,8 @@ def _guard_of_pairs(
         left_out=left_out,
         moving=moving,
         first=np.flatnonzero(np.diff(arm_bodies.owner[moving], prepend=-1)),
-        ours=joined[:, 0],
-        theirs=joined[:, 1],
+        ours=rows[:, 0],
+        theirs=rows[:, 1],
         starts=np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.empty(0, np.intp),
     )
 

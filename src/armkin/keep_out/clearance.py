@@ -68,8 +68,10 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
 
 def name_clearances(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:
     """Clearances (N,) and the names of their pairs (N,), in the shape of a batch."""
-    held = _guard(arm)
-    bodies, partners = (np.array([held.pair_names(k)[side] for k in range(len(held.pairs))] or [""]) for side in (0, 1))
+    guard = _guard(arm)
+    bodies, partners = (
+        np.array([guard.pair_names(k)[side] for k in range(len(guard.pairs))] or [""]) for side in (0, 1)
+    )
     return Clearance(mm.reshape(lead)[()], bodies[pairs].reshape(lead)[()], partners[pairs].reshape(lead)[()])
 
 
@@ -103,8 +105,8 @@ def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:
     for clearances in arm_guard.clearances(full_q):
         posture_hits: list[Hit] = []
         for pair in np.argsort(clearances, kind="stable")[: int((clearances < 0).sum())]:
-            body, other = arm_guard.pair_names(pair)
-            posture_hits.append({"body": body, "with": other, "depth_mm": float(-clearances[pair])})
+            body, partner = arm_guard.pair_names(pair)
+            posture_hits.append({"body": body, "with": partner, "depth_mm": float(-clearances[pair])})
         answers.append((float(clearances.min()) if len(clearances) else None, posture_hits))
     return answers
 

@@ -110,26 +110,26 @@ class _Round:
         self.bound = (clearances[:-1] + clearances[1:] - motions) / 2
         greatest = np.maximum.accumulate(clearances, axis=0)
         # least allowed clearance from there on
-        least = np.where(overlaps_at_start & (greatest < 0.0), greatest - STEP, 0.0)
-        required = np.concatenate([least[:1], least[:-1]])
+        allowed = np.where(overlaps_at_start & (greatest < 0.0), greatest - STEP, 0.0)
+        required = np.concatenate([allowed[:1], allowed[:-1]])
         is_hit = (clearances < required).any(axis=1)
         self.hit = int(np.argmax(is_hit)) if is_hit.any() else len(places)  # the first place of a hit
-        self.open: NDArray[np.bool_] = np.asarray((self.bound < least[:-1]).any(axis=1))
+        self.open: NDArray[np.bool_] = np.asarray((self.bound < allowed[:-1]).any(axis=1))
         self.open[self.hit :] = False
         is_divisible = np.diff(places) > _MIN_SHARE
-        stuck = self.open & ~((self.bound < least[:-1]) & (motions >= STEP) & is_divisible[:, None]).any(axis=1)
+        is_stuck = self.open & ~((self.bound < allowed[:-1]) & (motions >= STEP) & is_divisible[:, None]).any(axis=1)
         # the first undecided interval that is too small to halve
-        self.stuck = int(np.argmax(stuck)) if stuck.any() else len(places)
+        self.stuck = int(np.argmax(is_stuck)) if is_stuck.any() else len(places)
         self.open[self.stuck :] = False
-        self.lacking = np.where(self.bound < least[:-1], self.bound - least[:-1], np.inf)
+        self.lacking = np.where(self.bound < allowed[:-1], self.bound - allowed[:-1], np.inf)
 
     def to_halve(self, tight: bool) -> Array:
         """Places at which undecided intervals are split; empty when the proof is complete."""
         rows = np.flatnonzero(self.open)
         if tight and not len(rows) and self.hit == self.stuck == len(self.places):
             bounds = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
-            least = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
-            rows = np.flatnonzero(bounds < least - max(_GAPS[0], _GAPS[1] * least)) if np.isfinite(least) else rows
+            lowest = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
+            rows = np.flatnonzero(bounds < lowest - max(_GAPS[0], _GAPS[1] * lowest)) if np.isfinite(lowest) else rows
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
         cell_end = np.round((low + high) / 2)  # an interval of several cells is split at the end of a cell
@@ -153,5 +153,5 @@ class _Round:
             pair = int(np.argmin(self.clearances[0]))
             return proof(free=True, place=0.0, pair=pair, mm=float(self.clearances[:, pair].min()))
         row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
-        nearer = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
-        return proof(free=True, place=float(self.places[nearer]), pair=pair, mm=float(bound[row, pair]))
+        index = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
+        return proof(free=True, place=float(self.places[index]), pair=pair, mm=float(bound[row, pair]))

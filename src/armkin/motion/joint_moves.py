@@ -65,11 +65,11 @@ def straight_move(
     the joints' max_accel must hold then, too. On a short move its rounded whole steps count as well.
     """
     change = np.abs(end - start)
-    moving = change > 1e-12
-    if not moving.any():
+    moves = change > 1e-12
+    if not moves.any():
         return Straight(start, end, rest_profile(0.0))
-    top_speed = float((arm.max_speed[moving] / change[moving]).min()) * speed
-    accel = float((arm.max_accel[moving] / change[moving]).min())
+    top_speed = float((arm.max_speed[moves] / change[moves]).min()) * speed
+    accel = float((arm.max_accel[moves] / change[moves]).min())
     motor_travel = np.abs(arm.motor_gain @ (end - start))
     if arm.motors and not undriven_joints(arm):
         motor_travel = np.maximum(motor_travel, np.abs(np.diff(pulses(arm, [start, end]), axis=0)[0]))
@@ -78,7 +78,7 @@ def straight_move(
     accel *= share
     if jerk is None:
         return Straight(start, end, trapezoid(1.0, top_speed, accel))
-    return Straight(start, end, seven_phases(1.0, top_speed, accel, float((jerk[moving] / change[moving]).min())))
+    return Straight(start, end, seven_phases(1.0, top_speed, accel, float((jerk[moves] / change[moves]).min())))
 
 
 def approach_move(
@@ -88,8 +88,8 @@ def approach_move(
 
     They are the same if the motors have the same counts in both. speed, share, jerk: as in `straight_move`.
     """
-    same = np.abs(start - present).max() <= 1e-12
-    if same or (arm.motors and not undriven_joints(arm) and np.array_equal(pulses(arm, start), pulses(arm, present))):
+    equal = np.abs(start - present).max() <= 1e-12
+    if equal or (arm.motors and not undriven_joints(arm) and np.array_equal(pulses(arm, start), pulses(arm, present))):
         return None
     return Trajectory(arm, present, (straight_move(arm, present, start, speed, share, jerk),))
 
@@ -109,11 +109,11 @@ def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
 
 def missing_rates(arm: Arm) -> dict[str, list[str]]:
     """Keys that motion needs and the robot file lacks: {"max_speed": [joint, ...], ...}."""
-    missing = {
+    lacking = {
         key: [name for name, value in zip(arm.joint_names, values, strict=True) if np.isnan(value)]
         for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel))
     }
-    return {key: names for key, names in missing.items() if names}
+    return {key: names for key, names in lacking.items() if names}
 
 
 _EXAMPLES = {("deg", "max_speed"): 30, ("deg", "max_accel"): 60, ("mm", "max_speed"): 20, ("mm", "max_accel"): 50}
@@ -136,10 +136,10 @@ def rate_lines(arm: Arm) -> list[str]:
 
 def check_rates(arm: Arm) -> None:
     """Raise UsageError, naming every joint, if a max_speed or max_accel is missing."""
-    missing = missing_rates(arm)
-    if missing:
+    lacking = missing_rates(arm)
+    if lacking:
         complaints = [f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}"
-                   for key, names in missing.items()]  # fmt: skip
+                   for key, names in lacking.items()]  # fmt: skip
         lines = rate_lines(arm)
         raise UsageError(
             f"{', '.join(complaints)}: motion needs {'them' if len(lines) > 1 else 'one'}{_advice_to_add(arm, lines)}",

@@ -35,8 +35,8 @@ class Box:
         start, direction = (self._in_box_axes(part.reshape(3, -1)) for part in (a, b - a))
         start -= (self.axes.T @ self.centre)[:, None]
         distances = np.sqrt(_outer_distance(start, direction, self.half))
-        if (inside := np.flatnonzero(distances == 0.0)).size:
-            distances[inside] = _inner_distance(start[:, inside], direction[:, inside], self.half)
+        if (in_box := np.flatnonzero(distances == 0.0)).size:
+            distances[in_box] = _inner_distance(start[:, in_box], direction[:, in_box], self.half)
         return distances.reshape(batch_shape)
 
     def of_points(self, p: Array) -> Array:
@@ -49,8 +49,8 @@ class Box:
 
     def _in_box_axes(self, v: Array) -> Array:
         """Vectors (3, M) in the axes of the box."""
-        turned: Array = v.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ v
-        return turned
+        components: Array = v.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ v
+        return components
 
     def corners(self) -> Array:
         """The corners (8, 3) [mm]."""
@@ -98,8 +98,8 @@ def _outer_distance(start: Array, direction: Array, half: Array) -> Array:
     t = low + np.minimum(share, 1.0) * (high - low)
     t = np.where(slope_high <= 0.0, high, np.where(slope_low >= 0.0, low, t))
     excess = np.maximum(np.abs(start + t * direction) - h, 0.0)
-    least: Array = np.einsum("km,km->m", excess, excess)
-    return least
+    square: Array = np.einsum("km,km->m", excess, excess)
+    return square
 
 
 def _half_slope(t: Array, start: Array, direction: Array, h: Array) -> Array:

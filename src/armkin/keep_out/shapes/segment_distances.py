@@ -27,10 +27,10 @@ def segment_distance(a: Array, b: Array, c: Array, d: Array) -> Array:
             (_clip_to_segment(-uw / uu), 0.0),
             (_clip_to_segment((uv - uw) / uu), 1.0),
         )
-    least = _squared_distance(w, u, v, np.where(is_inside, s, 0.0), np.where(is_inside, t, candidates[0][1]))
+    square = _squared_distance(w, u, v, np.where(is_inside, s, 0.0), np.where(is_inside, t, candidates[0][1]))
     for s_end, t_end in candidates:
-        least = np.minimum(least, _squared_distance(w, u, v, s_end, t_end))
-    return np.sqrt(least)
+        square = np.minimum(square, _squared_distance(w, u, v, s_end, t_end))
+    return np.sqrt(square)
 
 
 def _clip_to_segment(x: Array) -> Array:

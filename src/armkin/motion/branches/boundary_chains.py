@@ -34,20 +34,20 @@ def add_boundary_chains(
 ) -> list[Chain]:
     """The chains and those joined from them at boundaries; fixed: (n,) the posture at the start, or None."""
     s, last = columns.s, len(columns.s) - 1
-    joined = chains = _bridge_pairs(s, chains, tolerance)
+    result = chains = _bridge_pairs(s, chains, tolerance)
     if not last:
-        return joined
+        return result
     postures = columns.q[0][columns.valid[0]] if fixed is None else fixed[None]
-    joined = _add_new_chains(joined, [part for c in chains for part in _chains_from(s, c, 0, postures, tolerance)])
+    result = _add_new_chains(result, [part for c in chains for part in _chains_from(s, c, 0, postures, tolerance)])
     for boundary in _boundary_samples(columns, chains):
         postures = columns.q[boundary][columns.valid[boundary]]
-        arriving = [part for c in joined for part in _chains_to(s, c, boundary, postures, tolerance)]
+        arriving = [part for c in result for part in _chains_to(s, c, boundary, postures, tolerance)]
         # A chain joined at an earlier boundary continues as one of `chains`, so these are all that leave.
         leaving = [part for c in chains for part in _chains_from(s, c, boundary, postures, tolerance)]
         new_chains = (_join_chains(a, b) for a, b in product(arriving, leaving) if _are_consecutive(a, b))
-        joined += islice(new_chains, max(_MAX_CHAINS - len(joined), 0))
+        result += islice(new_chains, max(_MAX_CHAINS - len(result), 0))
     postures = columns.q[last][columns.valid[last]]
-    return _add_new_chains(joined, [part for c in joined for part in _chains_to(s, c, last, postures, tolerance)])
+    return _add_new_chains(result, [part for c in result for part in _chains_to(s, c, last, postures, tolerance)])
 
 
 def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
@@ -71,10 +71,10 @@ def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain
     Joints 4 and 6 are undetermined exactly where the wrist is straight: the first chain ends a few micrometres before
     that sample and the second begins behind it, at nearly the same joint values.
     """
-    bridged = list(chains)
+    result = list(chains)
     for a in chains:
         successors = [
-            b for b in bridged if a.last < b.first and s[b.first] - s[a.last] <= _END_DISTANCE and len(b.q) > 1
+            b for b in result if a.last < b.first and s[b.first] - s[a.last] <= _END_DISTANCE and len(b.q) > 1
         ]
         for b in successors[:_MAX_BOUNDARIES] if len(a.q) > 1 else []:
             step = joint_change(a.arm, a.q[-1], b.q[0])
@@ -83,8 +83,8 @@ def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain
             share = (s[a.last + 1 : b.first + 1] - s[a.last]) / (s[b.first] - s[a.last])
             q_between = a.q[-1] + share[:, None] * step
             labels = np.concatenate([a.labels, np.repeat(b.labels[:1], len(share))])
-            bridged.append(_join_chains(Chain(a.arm, a.first, np.concatenate([a.q, q_between]), labels), b))
-    return bridged
+            result.append(_join_chains(Chain(a.arm, a.first, np.concatenate([a.q, q_between]), labels), b))
+    return result
 
 
 def _chains_to(s: Array, chain: Chain, end: int, postures: Array, tolerance: float) -> list[Chain]:

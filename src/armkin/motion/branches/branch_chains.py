@@ -81,9 +81,9 @@ class Chain:
     def _joint_reach(self) -> Int:
         """The first sample, counted from `first`, that each joint cannot reach from every sample: (len, n)."""
         N = len(self.q)
-        own = np.arange(N)  # a joint without a legal copy ends at the sample itself
+        sample = np.arange(N)  # a joint without a legal copy ends at the sample itself
         ends = [
-            np.full(N, N) if end is None else np.maximum(own, end.max(axis=0, initial=0)) for _, end in self._copies
+            np.full(N, N) if end is None else np.maximum(sample, end.max(axis=0, initial=0)) for _, end in self._copies
         ]
         return np.stack(ends, axis=1)
 
@@ -136,8 +136,8 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     N, B = columns.q.shape[:2]
     valid = columns.valid
     identity = np.where(valid[:-1], np.arange(B), -1) == columns.partner
-    steady = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
-    events = np.append(np.flatnonzero(~steady), N - 1)
+    unchanged = identity.all(axis=1) & (valid[:-1] == valid[1:]).all(axis=1)
+    events = np.append(np.flatnonzero(~unchanged), N - 1)
     open_chains: dict[int, list[tuple[int, int, int]]] = {
         int(column): [] for column in np.flatnonzero(valid[0])
     }  # column: blocks
@@ -216,8 +216,8 @@ def _possible_starts(chains: list[Chain], N: int) -> Bool:
 
 def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
     """The run of the chain with the least motion, of those that carry from sample i to `last_sample`."""
-    best = min((c for c in choices if c.carries_to(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
-    return Run(best, i, last_sample)
+    chain = min((c for c in choices if c.carries_to(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
+    return Run(chain, i, last_sample)
 
 
 def least_time(chain: Chain, i: int, last: int) -> float:
@@ -242,8 +242,8 @@ class EndReason(NamedTuple):
 def end_reason(columns: Columns, chain: Chain, i: int) -> EndReason:
     """Why a run from sample i ends: a hit, a limit, the path's end, the reach, a boundary or a singularity."""
     last = chain.carries_to(i)
-    beyond = min(max(last + 1, 0), len(columns.s) - 1)
-    status = Status(int(columns.status[beyond])).name.lower()
+    next_sample = min(max(last + 1, 0), len(columns.s) - 1)
+    status = Status(int(columns.status[next_sample])).name.lower()
     if chain.ends_by_hit(i):
         return EndReason("hit", status)
     joint = chain.limiting_joint(i)
@@ -256,11 +256,11 @@ def end_reason(columns: Columns, chain: Chain, i: int) -> EndReason:
         upper = abs(value_beyond - arm.upper[joint]) < abs(value_beyond - arm.lower[joint])
         limit = float(arm.upper[joint] if upper else arm.lower[joint])
         return EndReason("limit", status, joint, limit)
-    if beyond == last:
+    if next_sample == last:
         return EndReason("end", status)
     count = columns.valid.sum(axis=1)
     # Two branches that meet at the edge of the reach end one or two samples before it.
     next_samples = (columns.s > columns.s[last]) & (columns.s < columns.s[last] + 10 * END_ACCURACY)
     if (columns.status[next_samples] == Status.UNREACHABLE).any():
         return EndReason("reach", Status.UNREACHABLE.name.lower())
-    return EndReason("boundary" if count[beyond] < count[last] else "singularity", status)
+    return EndReason("boundary" if count[next_sample] < count[last] else "singularity", status)

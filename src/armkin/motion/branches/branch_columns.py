@@ -134,16 +134,16 @@ class Samples:
             # Some joints are free exactly on a singularity, but determined 1e-7 of the path length beside it.
             s_beside = np.clip(s[singular] + 1e-7 * self.length, 0.0, self.length)
             s_beside = np.where(s_beside == s[singular], s[singular] - 1e-7 * self.length, s_beside)
-            beside = ik(self.arm, self.targets(s_beside), self.task, near=self.near)
+            neighbours = ik(self.arm, self.targets(s_beside), self.task, near=self.near)
             # Keep the singular posture where its neighbour has no branch, for example with a stretched arm.
-            replaced = (beside.status != Status.SINGULAR) & beside.valid.any(axis=1)
-            B = max(q.shape[1], beside.q.shape[1])
+            replaced = (neighbours.status != Status.SINGULAR) & neighbours.valid.any(axis=1)
+            B = max(q.shape[1], neighbours.q.shape[1])
             q, name, legal = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(legal, B, 0).copy()
-            legal[singular[replaced]] = _pad(beside.within_limits, B, 0)[replaced]
-            q[singular[replaced]] = _pad(beside.q, B)[replaced]
-            name[singular[replaced]] = _pad(beside.branch.astype(np.int16), B, -1)[replaced]
-            if self.stays and len(kept := singular[~replaced]):
-                q[kept] = self._hold_free_joints(q[kept], self.targets(s[kept]), solutions.free[kept], legal[kept])
+            legal[singular[replaced]] = _pad(neighbours.within_limits, B, 0)[replaced]
+            q[singular[replaced]] = _pad(neighbours.q, B)[replaced]
+            name[singular[replaced]] = _pad(neighbours.branch.astype(np.int16), B, -1)[replaced]
+            if self.stays and len(stay := singular[~replaced]):
+                q[stay] = self._hold_free_joints(q[stay], self.targets(s[stay]), solutions.free[stay], legal[stay])
         return _columns_by_name(solutions, s, q, name, legal)
 
     def _hold_free_joints(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
@@ -201,8 +201,8 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
 
 def _pad(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
     """The values with B columns on axis 1 at least, the new ones `fill`."""
-    missing = B - values.shape[1]
-    if missing <= 0:
+    added = B - values.shape[1]
+    if added <= 0:
         return values
-    padding = np.full((values.shape[0], missing, *values.shape[2:]), fill, values.dtype)
+    padding = np.full((values.shape[0], added, *values.shape[2:]), fill, values.dtype)
     return np.concatenate([values, padding], axis=1)

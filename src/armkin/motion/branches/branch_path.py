@@ -267,9 +267,9 @@ def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Arra
     return np.asarray(12 * tolerance / mean**2 / np.maximum(shift, 1e-12))
 
 
-def _drop_close_values(s: Array, least: float) -> Array:
-    """Sorted values without those less than `least` behind their predecessor; the last value is kept."""
-    keep = np.concatenate([[True], np.diff(s) > least])
+def _drop_close_values(s: Array, min_step: float) -> Array:
+    """Sorted values without those less than `min_step` behind their predecessor; the last value is kept."""
+    keep = np.concatenate([[True], np.diff(s) > min_step])
     separated = s[keep]
     separated[-1] = s[-1]
     return np.asarray(separated)

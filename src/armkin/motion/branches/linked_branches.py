@@ -63,8 +63,8 @@ class _Linking:
         self.added = 0
         self.fresh = np.zeros(0, bool)  # whether a sample was added by a division
         span = arm.upper - arm.lower
-        wide = ~arm.prismatic & (span > self.turn - 1e-6) & np.isfinite(span)
-        self.wide: list[int] = np.flatnonzero(wide).tolist()  # a range over a whole turn: two copies may be legal
+        turns = ~arm.prismatic & (span > self.turn - 1e-6) & np.isfinite(span)
+        self.wide: list[int] = np.flatnonzero(turns).tolist()  # a range over a whole turn: two copies may be legal
 
     def start(self, s: Array) -> None:
         """Solve the first samples and link them."""
@@ -160,9 +160,9 @@ class _Linking:
     def _give_up(self, steps: Int) -> None:
         """Stop dividing steps (M, parts) between singular postures: their free joints have no continuous values."""
         singular = self.columns.status == Status.SINGULAR
-        inside = (singular[:-1] & singular[1:])[steps]
-        mostly_torn = (self.torn[steps] & inside).sum(axis=1, keepdims=True) > _TORN_PARTS
-        self.torn[steps[mostly_torn & inside]] = False
+        between_singular = (singular[:-1] & singular[1:])[steps]
+        mostly_torn = (self.torn[steps] & between_singular).sum(axis=1, keepdims=True) > _TORN_PARTS
+        self.torn[steps[mostly_torn & between_singular]] = False
 
     def _link(self) -> None:
         """Find partners in the open steps."""
@@ -178,13 +178,13 @@ class _Linking:
         certified, wrapped = self._certify(columns.q[left], columns.q[right], valid[left] & valid[right])
         column = np.arange(columns.q.shape[1], dtype=np.int16)
         columns.partner[rows] = np.where(certified, column, np.int16(-1))
-        straight = (certified == (valid[left] | valid[right])).all(axis=1)
+        all_linked = (certified == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows], self.both[rows] = False, False
         flips = (columns.within_limits[left] != columns.within_limits[right]) & certified
         if self.wide:
             flips |= self._crossed_limits(columns.q, left, right, wrapped) & certified
         self.crossing[rows] = flips.any(axis=1)
-        for i in rows[~straight]:
+        for i in rows[~all_linked]:
             self._match_step(int(i), valid)
 
     def _certify(self, a: Array, b: Array, present: Bool) -> tuple[Bool, Bool]:
@@ -200,9 +200,9 @@ class _Linking:
         step, column = np.nonzero(present & ~certified)
         wrapped = np.zeros(certified.shape, bool)
         if len(step):
-            shorter = joint_change(self.arm, a[step, column], b[step, column])
-            certified[step, column] = chord_bound(self.lever, shorter) <= self.tolerance
-            wrapped[step, column] = np.abs(b[step, column] - a[step, column] - shorter).max(axis=1) > 1.0
+            change = joint_change(self.arm, a[step, column], b[step, column])
+            certified[step, column] = chord_bound(self.lever, change) <= self.tolerance
+            wrapped[step, column] = np.abs(b[step, column] - a[step, column] - change).max(axis=1) > 1.0
         return certified, wrapped
 
     def _match_step(self, i: int, valid: Bool) -> None:
@@ -245,6 +245,6 @@ class _Linking:
             crossed[step, column] = False
             for joint in self.wide:
                 for limit in (self.arm.lower[joint], self.arm.upper[joint]):
-                    before, after = (np.floor((x[:, joint] - limit) / self.turn[joint]) for x in (start, unwrapped_end))
-                    crossed[step, column] |= before != after
+                    n0, n1 = (np.floor((x[:, joint] - limit) / self.turn[joint]) for x in (start, unwrapped_end))
+                    crossed[step, column] |= n0 != n1
         return crossed

@@ -41,21 +41,21 @@ def correct_to_route(
 def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps: int) -> Array:
     """Joint values (N, n) after damped Newton steps from q to targets, each row until its step is negligible."""
     unit = radian_or_reach(arm)
-    solved, active, last_size = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
+    joints, active, last_size = q.copy(), np.arange(len(q)), np.full(len(q), np.inf)
     for _ in range(steps):
-        q = solved[active]
+        q = joints[active]
         T, J = _pose_and_jacobian(arm, task, q)
         r = _residuals(arm, task, T, q, target[active])
         step = _damped_steps(J, r, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
-        solved[active] = q + step.T * unit
+        joints[active] = q + step.T * unit
         # after a step much shorter than the last one the next step would be negligible
         continues = (size >= _SETTLED_LENGTH) & ((size > _SHORT_STEP) | (size > _STEP_RATIO * last_size))
         active, last_size = active[continues], size[continues]
         if not len(active):
             break
-    return solved
+    return joints
 
 
 def _row_scale(arm: Arm, task: Task) -> Array:
@@ -91,8 +91,8 @@ def _damped_steps(J: Array, r: Array, damping: float) -> Array:
         L.append([])
         for j in range(i + 1):
             entry = (J[i] * J[j]).sum(axis=0)
-            for above, below in zip(L[i], L[j], strict=False):
-                entry -= above * below
+            for a, b in zip(L[i], L[j], strict=False):
+                entry -= a * b
             L[i].append(np.sqrt(np.maximum(entry + damping, 1e-300)) if i == j else entry / L[j][j])
         for j in range(i):
             x[i] -= L[i][j] * x[j]
@@ -112,13 +112,13 @@ def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, co
     """
     point_numbers = np.sort(np.concatenate([np.arange(len(points)), rests]))
     s, values = points[point_numbers], np.asfortranarray(q[point_numbers])
-    d, unsolved = np.empty_like(values), np.ones(len(s), bool)
+    d, pending = np.empty_like(values), np.ones(len(s), bool)
     if coarser is not None:
         positions = np.searchsorted(s, coarser.s)
         positions += np.diff(coarser.s, prepend=-1.0) == 0
-        d[positions], unsolved[positions] = coarser.d, False
+        d[positions], pending[positions] = coarser.d, False
     ends = np.append(point_numbers[1:] == point_numbers[:-1], True)  # the end takes the slope of its left side
-    rows = np.flatnonzero(unsolved)
+    rows = np.flatnonzero(pending)
     for part in (rows[i : i + _BLOCK_POINTS] for i in range(0, len(rows), _BLOCK_POINTS)):
         slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_SLOPE_DISTANCE, _SLOPE_DISTANCE))
         if slopes is None:

@@ -74,8 +74,8 @@ def add_wrist_chains(
                 if chain.windows and s[sample] <= chain.windows[-1].end:
                     continue
                 for next_chain in chains:
-                    joined = _chain_through_window(arm, route, s, chain, next_chain, sample, (turn, tip_offset))
-                    joined_chains += [] if joined is None else [joined]
+                    new_chain = _chain_through_window(arm, route, s, chain, next_chain, sample, (turn, tip_offset))
+                    joined_chains += [] if new_chain is None else [new_chain]
         all_chains, latest = all_chains + joined_chains, joined_chains
         if not joined_chains or len(all_chains) > _MAX_SINGULARITIES * len(chains):
             break
@@ -116,8 +116,8 @@ def _window_spans(route: Route, s: Array, chain: Chain, next_chain: Chain, j: in
     low, high = route.breaks[max(piece - 1, 0)], route.breaks[min(piece, len(route.breaks) - 1)]
     low = max(low, s[chain.first], chain.windows[-1].end if chain.windows else 0.0)
     high = min(high, s[next_chain.last])
-    for half in _HALF_WIDTH * _WIDTH_FACTOR ** np.arange(_WIDTH_COUNT):
-        a, b = int(np.searchsorted(s, s[j] - half, side="right")) - 1, int(np.searchsorted(s, s[j] + half))
+    for half_width in _HALF_WIDTH * _WIDTH_FACTOR ** np.arange(_WIDTH_COUNT):
+        a, b = int(np.searchsorted(s, s[j] - half_width, side="right")) - 1, int(np.searchsorted(s, s[j] + half_width))
         if a < chain.first or b > min(next_chain.last, len(s) - 1) or s[a] < low or s[b] > high:
             return
         if b >= next_chain.first:
@@ -160,10 +160,10 @@ def _chain_through_window(
         a, b = spans[k]
         return _window_between(arm, route, s[[a, b]], chain.q[a - chain.first], next_chain.q[b - next_chain.first])
 
-    best = _widest_window(arm, route, window, range(len(spans)), allowed)
-    if best is None:
+    widest = _widest_window(arm, route, window, range(len(spans)), allowed)
+    if widest is None:
         return None
-    (a, b), crossing = spans[best[0]], best[1]
+    (a, b), crossing = spans[widest[0]], widest[1]
     q_inside = _joints_in_window(arm, route, crossing, s[a + 1 : b])
     offset = crossing.q[1] - next_chain.q[b - next_chain.first]
     q = np.concatenate([chain.q[: a + 1 - chain.first], q_inside, next_chain.q[b - next_chain.first :] + offset])
@@ -179,11 +179,11 @@ def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array
         return q
     q = correct_to_route(arm, route.task, q, add_detours(route, (window,)).targets(s), steps=12)
     # interpolate joints 4 and 6 where the wrist is nearly straight
-    bent = np.abs(_wrist_volume(arm, q)) > _VOLUME_SHARE
-    lengths = np.concatenate([[window.begin], s[bent], [window.end]])
-    q_known = np.concatenate([window.q[:1], q[bent], window.q[1:]])
+    is_bent = np.abs(_wrist_volume(arm, q)) > _VOLUME_SHARE
+    lengths = np.concatenate([[window.begin], s[is_bent], [window.end]])
+    q_known = np.concatenate([window.q[:1], q[is_bent], window.q[1:]])
     for joint in (3, 5):
-        q[~bent, joint] = np.interp(s[~bent], lengths, q_known[:, joint])
+        q[~is_bent, joint] = np.interp(s[~is_bent], lengths, q_known[:, joint])
     return q
 
 
@@ -214,8 +214,8 @@ def _follows_detour(arm: Arm, route: Route, window: Window) -> bool:
     """Whether the joints meet the detoured targets in the whole window."""
     s = np.linspace(window.begin, window.end, _PLACE_COUNT)
     T, goal = fk(arm, _joints_in_window(arm, route, window, s)), add_detours(route, (window,)).targets(s)
-    missed = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
-    return bool(missed < _EXACT_ERROR)
+    miss = np.abs(T[:, :3, 3] - goal[:, :3, 3]).max() + np.abs(_small_turns(T, goal)).max()
+    return bool(miss < _EXACT_ERROR)
 
 
 def _small_turns(T: Array, target: Array) -> Array:

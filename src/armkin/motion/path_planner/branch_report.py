@@ -61,7 +61,7 @@ def _branch_names(columns: Columns, run: Run, offset: float) -> list[tuple[float
 
 def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
     """The branches at the start, sorted by how far each carries; of equal ones the chosen branch comes first."""
-    columns, ranked, chosen = carried.columns, [], None
+    columns, ranked, first_run_branch = carried.columns, [], None
     for chain in carried.chains:
         if chain.first == 0:
             last = chain.carries_to(0)
@@ -71,8 +71,8 @@ def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch
             end_text = reason_text(arm, _reconfiguration_at(arm, columns, chain, 0, 0.0))
             ranked.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
             if carried.runs and chain is carried.runs[0].chain:
-                chosen = ranked[-1][1]
-    ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not chosen))
+                first_run_branch = ranked[-1][1]
+    ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not first_run_branch))
     distinct: list[Branch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
     for _, branch in ranked:
         q = branch.start_joints

@@ -106,9 +106,9 @@ def _steps_carried(
 
 def _stop_reason(arm: Arm, q: Array, starts_in_hit: bool) -> str:
     """The limit or the hit at a posture, in words; starts_in_hit: the line begins in contact, so hits do not end it."""
-    outside = (q < arm.lower) | (q > arm.upper)
-    if outside.any():
-        return f"{arm.joint_names[int(np.argmax(outside))]} is at its limit"
+    beyond_limits = (q < arm.lower) | (q > arm.upper)
+    if beyond_limits.any():
+        return f"{arm.joint_names[int(np.argmax(beyond_limits))]} is at its limit"
     if arm.keep_out and not arm.ignores_keep_out and not starts_in_hit:
         body_clearance = clearance(arm, q)
         if float(body_clearance.mm) < 0:

@@ -146,22 +146,22 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, preferred: float,
         return
     values = _values_over_range(arm, joint, preferred)
     joint_angles = values * arm.ratio[joint]
-    missing = np.zeros((1, len(values)), int)
+    lacking = np.zeros((1, len(values)), int)
     for targets in routes:
-        missing += _count_lacking(free_arm, extra, targets, joint_angles, MAX_TARGETS, [])
+        lacking += _count_lacking(free_arm, extra, targets, joint_angles, MAX_TARGETS, [])
     order = np.argsort(np.abs(values - preferred), kind="stable")
-    carried = order[missing[0, order] == missing.min()]
-    if free_arm.keep_out and not free_arm.ignores_keep_out and len(carried) > 1:
+    candidates = order[lacking[0, order] == lacking.min()]
+    if free_arm.keep_out and not free_arm.ignores_keep_out and len(candidates) > 1:
         # a motion near a keep-out takes long to prove, so values with clearance come first
         margins = [0.0, MIN_GAP * free_arm.reach]
-        count = max(MAX_POSTURES // (len(carried) * len(routes)), 2)
-        near_hits = np.zeros((3, len(carried)), int)
+        count = max(MAX_POSTURES // (len(candidates) * len(routes)), 2)
+        near_hits = np.zeros((3, len(candidates)), int)
         for targets in routes:
             near_hits += _count_lacking(
-                free_arm, extra, targets, joint_angles[carried], min(count, MAX_TARGETS), margins
+                free_arm, extra, targets, joint_angles[candidates], min(count, MAX_TARGETS), margins
             )
-        carried = carried[np.lexsort((near_hits[2] > 0, near_hits[1]))]
-    yield from values[carried[: MAX_VALUES if missing.min() == 0 else 1]].tolist()
+        candidates = candidates[np.lexsort((near_hits[2] > 0, near_hits[1]))]
+    yield from values[candidates[: MAX_VALUES if lacking.min() == 0 else 1]].tolist()
 
 
 def _count_lacking(
@@ -185,9 +185,9 @@ def _count_lacking(
         conditions += [mm >= margin for margin in margins]
     counts = []
     for allowed in conditions:
-        solved = allowed.any(axis=1, keepdims=True)
+        has_branch = allowed.any(axis=1, keepdims=True)
         if extra.geometry.ordered:
             on_branch = ik_answers.branch[:, :, None] == np.arange(len(ik_answers.names))
-            solved = (allowed[:, :, None] & on_branch).any(axis=1)
-        counts.append(len(sample) - solved.reshape(len(values), len(sample), -1).sum(axis=1).max(axis=1))
+            has_branch = (allowed[:, :, None] & on_branch).any(axis=1)
+        counts.append(len(sample) - has_branch.reshape(len(values), len(sample), -1).sum(axis=1).max(axis=1))
     return np.array(counts)

@@ -122,8 +122,8 @@ class Fastest:
         self.cap[:-1][intervals] = feasible
         forward, count = forward_step(h, slope, level), len(h)
         a, b = (np.concatenate(terms, axis=1) for terms in zip(backward_step(*forward), forward, strict=True))
-        pruned = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], feasible]))
-        return pruned.part(0, count), pruned.part(count, 2 * count)
+        least = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], feasible]))
+        return least.part(0, count), least.part(count, 2 * count)
 
 
 def interval_parts(intervals: int) -> list[slice]:

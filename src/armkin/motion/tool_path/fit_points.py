@@ -158,8 +158,8 @@ def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[_Cubics, 
 
 def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
     """Which inner points of the used curves lie farther from the cubics than the tolerance: (N,)."""
-    inside = np.concatenate([[False], used[1:] & used[:-1] & ~chords.corner[1:-1], [False]])
-    number = np.flatnonzero(inside)
+    astray = np.concatenate([[False], used[1:] & used[:-1] & ~chords.corner[1:-1], [False]])
+    number = np.flatnonzero(astray)
     y, parameters, min_square = chords.y[number], chords.u[number], np.full(len(number), np.inf)
     for _ in range(3):  # Newton steps to the nearest place
         i = np.clip(np.searchsorted(layout.begin, parameters, side="right") - 1, 0, len(cubics) - 1)
@@ -170,8 +170,8 @@ def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
         min_square = np.minimum(min_square, (offsets**2).sum(axis=1))
         step = (offsets * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
         parameters = parameters + np.clip(step, -1.0, 1.0)
-    inside[number[min_square <= tolerance**2]] = False
-    return inside
+    astray[number[min_square <= tolerance**2]] = False
+    return astray
 
 
 def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:
@@ -226,7 +226,7 @@ def _blend_corners(
     u = chords.u[corner]
     max_radius = np.where(stop, 0.0, 0.5 * np.minimum(chords.length[corner - 1], chords.length[corner]))
     offset = 1e-9 * max_radius
-    slope_before, slope_after = (curves.values(u + way)[1] for way in (-offset, offset))
+    slope_before, slope_after = (curves.values(u + shift)[1] for shift in (-offset, offset))
     bend = np.linalg.norm(slope_before - slope_after, axis=1)
     r = np.minimum(max_radius, 4 * tolerance / np.maximum(bend, 1e-12))
     for _ in range(20):

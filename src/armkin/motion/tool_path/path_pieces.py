@@ -96,11 +96,11 @@ class Dense:
 
     def part(self, a: float, b: float) -> Dense:
         """The points and lengths of the part from length a to b [mm]."""
-        passed, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
+        given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
         return replace(
             self,
-            given=self.given[passed] - a,
-            points=self.points[passed],
+            given=self.given[given] - a,
+            points=self.points[given],
             bends=self.bends[bends] - a,
             spans=self.spans[(self.spans > a) & (self.spans < b)] - a,
             begins=self.begins - a,
@@ -152,13 +152,13 @@ class Piece:
         """The part from length a to b."""
         begin = split_target(self.task, self.targets(np.array([a]))[0])
         n = self.task.position + len(self.task.sums)
-        turned = rotation_matrices(self.curve(np.array([a]))[:, n:])[0]
+        rotation = rotation_matrices(self.curve(np.array([a]))[:, n:])[0]
 
         def curve(s: Array) -> Array:
             y = self.curve(s + a)
             if self.first.turned is None:
                 return y
-            w = rotation_vectors(rotation_matrices(y[:, n:]) @ turned.T)
+            w = rotation_vectors(rotation_matrices(y[:, n:]) @ rotation.T)
             return np.concatenate([y[:, :n], w], axis=1)
 
         dense = None if self.dense is None else self.dense.part(a, b)
@@ -249,9 +249,9 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> Blend:
     side: the first piece's length before the blend at its other end. The radius is `radius`, or less to leave half of
     each side.
     """
-    corner, half = b.first.p, max(a.length - side / 2, 0.0)
-    radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half), (b, b.length / 2))))
-    cut_a = _length_at_radius(a, corner, radius, a.length, half)
+    corner, half_side = b.first.p, max(a.length - side / 2, 0.0)
+    radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half_side), (b, b.length / 2))))
+    cut_a = _length_at_radius(a, corner, radius, a.length, half_side)
     cut_b = _length_at_radius(b, corner, radius, 0.0, b.length / 2)
     first, second = a.part(0.0, cut_a), b.part(cut_b, b.length)
     start, end = first.last, second.first

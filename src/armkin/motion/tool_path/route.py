@@ -156,40 +156,40 @@ def join_pieces(
     reduced, and counted in `reduced`.
     """
     reduced = ReducedBlends() if reduced is None else reduced
-    joined: list[Piece] = []
+    all_pieces: list[Piece] = []
     side = 0.0  # length of the last piece before its blend
     stops, order = {0}, {}
     rests: set[int] = set()  # values of `order`
     for number, piece in enumerate(pieces):
         if number in pauses:
-            order[number] = len(joined)
-            rests.add(len(joined))
+            order[number] = len(all_pieces)
+            rests.add(len(all_pieces))
         if piece.length < MIN_LENGTH:
             continue
-        if not joined or len(joined) in rests:
-            stops.add(len(joined))
-            joined.append(piece)
+        if not all_pieces or len(all_pieces) in rests:
+            stops.add(len(all_pieces))
+            all_pieces.append(piece)
             side = piece.length
             continue
-        previous, wanted = joined[-1], blends[number - 1]
+        previous, blend_radius = all_pieces[-1], blends[number - 1]
         angle = _corner_angle(previous, piece)
         if angle < _SMOOTH_ANGLE:
-            joined.append(piece)
-        elif (radius := _blend_radius(previous, piece, angle, wanted, tolerance)) <= 0:
-            stops.add(len(joined))
-            joined.append(piece)
+            all_pieces.append(piece)
+        elif (radius := _blend_radius(previous, piece, angle, blend_radius, tolerance)) <= 0:
+            stops.add(len(all_pieces))
+            all_pieces.append(piece)
         else:
             rounded = blend(task, previous, piece, radius, side)
             middle = rounded.middle
-            if wanted is None:
+            if blend_radius is None:
                 middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
             else:
-                reduced.note(wanted, rounded.radius)
-            before = [part for part in (rounded.first, middle) if part.length > MIN_LENGTH]
-            joined[-1:] = [*before, rounded.second]
+                reduced.note(blend_radius, rounded.radius)
+            parts = [part for part in (rounded.first, middle) if part.length > MIN_LENGTH]
+            all_pieces[-1:] = [*parts, rounded.second]
         side = piece.length
-    stops.add(len(joined))
-    return Route(task, tuple(joined), frozenset(stops)), order
+    stops.add(len(all_pieces))
+    return Route(task, tuple(all_pieces), frozenset(stops)), order
 
 
 def _corner_angle(last_piece: Piece, piece: Piece) -> float:
