@@ -213,9 +213,9 @@ def _nudge_joint(board: Board, person: Operator, joint: int, start: float) -> No
         if seconds > 0.01:
             _jog_joint(board, person, joint, sign, seconds, is_held)
         else:
-            other = "-+"[sign < 0]
+            reverse = "-+"[sign < 0]
             person.say(
-                f"{arm.joint_names[joint]} has moved by {DIRECTION_STEP:g}: {other} takes it back, Enter goes on."
+                f"{arm.joint_names[joint]} has moved by {DIRECTION_STEP:g}: {reverse} takes it back, Enter goes on."
             )
 
 

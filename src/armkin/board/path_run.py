@@ -56,20 +56,20 @@ def check_pauses(plan: PathPlan, answers: bool) -> None:
 def follow_plan(
     board: Board,
     plan: PathPlan,
-    laid: Sequence[Planned],
+    parts: Sequence[Planned],
     progress: Progress,
     first: int = 0,
     ask: Callable[[], object] = lambda: None,
 ) -> None:
     """Carry out the parts of a plan, numbered from `first` on, and the gripper moves between them.
 
-    laid: the parts as plans for the board; ask: waits for the user to end a pause.
+    parts: as plans for the board; ask: waits for the user to end a pause.
     """
-    elapsed, total = 0.0, sum(part.duration for part in laid)
+    elapsed, total = 0.0, sum(part.duration for part in parts)
     markers: list[Marker | None] = list(plan.markers)
     if plan.approach is not None:  # no marker follows the approach
         markers.insert(0, None)
-    for number, part in enumerate(laid, first):
+    for number, part in enumerate(parts, first):
         if part.trajectory.stretches:
             offset = elapsed
             board.machine.run([part], lambda seconds, _, offset=offset: progress(offset + seconds, total))  # type: ignore[misc]

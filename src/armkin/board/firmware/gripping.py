@@ -27,11 +27,11 @@ def gripper_of(name: str, configuration: Configuration) -> Grip:
 
 def count_of(gripper: Grip, value: str | float) -> int:
     """Counts of open, closed, or a value of the drive. Raises UsageError for a value that is not between them."""
-    named = {"open": gripper.open, "closed": gripper.closed}
+    counts_by_name = {"open": gripper.open, "closed": gripper.closed}
     if isinstance(value, str):
-        return named[value]
+        return counts_by_name[value]
     count = gripper.count(value)
-    low, high = sorted(named.values())
+    low, high = sorted(counts_by_name.values())
     if not low <= count <= high:
         ends = sorted((gripper.value(low), gripper.value(high)))
         raise UsageError(f"grip: {value:g} is outside of the gripper's {ends[0]:g} to {ends[1]:g}")

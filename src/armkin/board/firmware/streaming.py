@@ -114,15 +114,15 @@ def _others_running() -> int:
 
 
 def lead_time(
-    session: Session, frames: Sequence[tuple[float, int, int]], least: float = 0.0, unheard: float = 0.0
+    session: Session, frames: Sequence[tuple[float, int, int]], min_pause: float = 0.0, unheard: float = 0.0
 ) -> float:
-    """The pause [s] before a motion, at least `least`, that keeps the queue from running dry.
+    """The pause [s] before a motion, at least `min_pause`, that keeps the queue from running dry.
 
     frames: seconds, segments and bytes on the line of the motion's first frames; unheard: [s] before the first step.
     """
     busy_pause = next((seconds for load, seconds in _LEAD_BUSY if _processor_load(session) > load), 0.0)
     noise_pause = NOISY_LEAD if session.line.damaged else 0.0
-    return max(least, busy_pause, noise_pause, min(_LEAD_TIME + _lateness(session, frames, unheard), MAX_LEAD))
+    return max(min_pause, busy_pause, noise_pause, min(_LEAD_TIME + _lateness(session, frames, unheard), MAX_LEAD))
 
 
 def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> list[float]:
@@ -169,21 +169,21 @@ def _seconds_queued(session: Session) -> float:
 
 
 def motion_batches(
-    session: Session, move: Move, axes: Sequence[int], clock: int, least: float = 0.0
+    session: Session, move: Move, axes: Sequence[int], clock: int, min_pause: float = 0.0
 ) -> Iterator[MotionFrame]:
-    """The frames of a move's segments, with fewer segments each on a bad line; least: see `lead_time`.
+    """The frames of a move's segments, with fewer segments each on a bad line; min_pause: see `lead_time`.
 
     Two frames may be unacknowledged, as the board can store the second one while it handles the first.
     """
     assert session.info is not None
     line = session.line
-    moving = sorted(move.moving, key=lambda k: axes[k])
-    begin_counts = [int(move.start[k]) for k in moving]
+    motors = sorted(move.moving, key=lambda k: axes[k])
+    begin_counts = [int(move.start[k]) for k in motors]
     room = min(session.info.frame - 4, session.info.receive - QUESTION_BYTES - 6)
     places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
-    source = (s.for_axes(moving) for s in move.segments)
+    source = (s.for_axes(motors) for s in move.segments)
     segments: list[Segment] = list(islice(source, _RECKONED_SEGMENTS))
-    sizes = _insert_pause(session, segments, room, clock, least) if segments else []
+    sizes = _insert_pause(session, segments, room, clock, min_pause) if segments else []
     is_start = not sizes
     while segments := segments + list(islice(source, max(0, _BATCH_SEGMENTS[1] + 1 - len(segments)))):
         # a larger frame would have to wait for space
@@ -198,7 +198,7 @@ def motion_batches(
         places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
         end = [p // protocol.STEP for p in places]
         yield MotionFrame(
-            axes=[axes[k] for k in moving],
+            axes=[axes[k] for k in motors],
             start=begin_counts,
             end=end,
             segments=part,
@@ -209,9 +209,9 @@ def motion_batches(
         begin_counts = end
 
 
-def _insert_pause(session: Session, segments: list[Segment], room: int, clock: int, least: float) -> list[int]:
+def _insert_pause(session: Session, segments: list[Segment], room: int, clock: int, min_pause: float) -> list[int]:
     """Insert the pause before a motion, and return the segments in its first frames; an empty list for no pause."""
-    pause, sizes = _plan_start(session, segments, room, clock, least)
+    pause, sizes = _plan_start(session, segments, room, clock, min_pause)
     # Behind a rest no pause is needed, as the queue fills while the earlier motion lasts.
     follow_time = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH_SEGMENTS[1], room)], clock))
     if not session.line.damaged and min(_seconds_queued(session), follow_time) >= pause:
@@ -230,11 +230,11 @@ def seconds_of(segments: Sequence[Segment], clock: int) -> float:
     return sum(s.units() for s in segments) * 256 / clock
 
 
-def _fitting_count(segments: Sequence[Segment], most: int, room: int) -> int:
-    """The number of segments in the next frame: at most `most`, in `room` bytes, all of one form."""
+def _fitting_count(segments: Sequence[Segment], limit: int, room: int) -> int:
+    """The number of segments in the next frame: at most `limit`, in `room` bytes, all of one form."""
     n = 1
     while (
-        n < min(most, len(segments))
+        n < min(limit, len(segments))
         and (segments[n].narrow == segments[0].narrow or not any(segments[0].rates))
         and motion_size(len(segments[0].rates), segments[: n + 1]) <= room
     ):
@@ -255,14 +255,14 @@ def delay_segment(first: Segment, pause: float, clock: int) -> Segment | None:
 
 
 def _plan_start(
-    session: Session, segments: Sequence[Segment], room: int, clock: int, least: float
+    session: Session, segments: Sequence[Segment], room: int, clock: int, min_pause: float
 ) -> tuple[float, list[int]]:
     """The pause before a motion from rest and the sizes of its first frames that let it begin earliest."""
     choices = list[tuple[float, float, list[int]]]()
     unheard = seconds_of(segments[:1], clock) if _is_unheard(segments[0]) else 0.0
     for sizes in [(_BATCH_SEGMENTS[0] - 1,)] if session.line.noisy else _FIRST_BATCHES:
         frames = _first_frames(segments, sizes, room, clock, paused=not unheard)
-        pause = lead_time(session, frames, least, unheard)
+        pause = lead_time(session, frames, min_pause, unheard)
         choices.append((_queued_times(session, frames, unheard)[0] + pause, pause, list(sizes)))
     return min(choices)[1:]
 

@@ -139,8 +139,8 @@ class Cutter:
     def _no_shorter(self, segment: Segment) -> Segment:
         """The segment with all intervals at least as long as the board needs."""
         shortest = self.min_interval + (self.min_interval // 4 if segment.quick else 0)
-        missing = shortest - min(segment.interval, segment.last_interval)
-        return replace(segment, interval=segment.interval + missing) if missing > 0 else segment
+        shortage = shortest - min(segment.interval, segment.last_interval)
+        return replace(segment, interval=segment.interval + shortage) if shortage > 0 else segment
 
     def _steady_segment(self, cycles: float, remainders: Sequence[int], steps: float, drift: float) -> Segment:
         """A segment of one speed for `cycles`; remainders: (motors,) [2^-23 step]; steps: of the fastest motor."""

@@ -81,7 +81,7 @@ class CurveSegments:
             seconds = np.maximum(np.diff(t), (np.abs(steps) / self._max_rates()).max(axis=1))
             change = self._speed_changes(t, steps).tolist()
             mean = np.vstack([steps / seconds[:, None], np.zeros(len(self.start))])
-            longer = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
+            next_times = np.maximum(seconds, np.append(seconds[1:], seconds[-1]))
             open_end = first + _BLOCK_SEGMENTS < len(bounds) - 1  # the segment behind this block is not known yet
             for i in range(len(t) - 1):
                 part = _Part(
@@ -91,7 +91,7 @@ class CurveSegments:
                     start_speed=last_speed,
                     start_time=max(float(seconds[i]), span),
                     next_speed=mean[i + 1],
-                    next_time=float(longer[i]),
+                    next_time=float(next_times[i]),
                 )
                 segment, last_speed = self._smooth_segment(cutter, part)
                 span = part.seconds
