@@ -164,3 +164,23 @@ def test_one_jerk_for_all_joints_is_each_ones_where_a_joint_is_redundant() -> No
     by_number, by_array = (armkin.path(arm, goals, jerk=jerk, samples=9) for jerk in (50.0, np.full(7, 50.0)))
     assert by_number.held == by_array.held
     assert by_number.duration == by_array.duration
+
+
+def test_postures_that_fail_leave_nothing_behind(three_dof: Arm) -> None:
+    """The tool's axes hang on the posture, and from the postures nearest to home the tool leaves the reach."""
+    tool, base = [-40, 40, 0], [10, 20, -40]
+    moves: list[dict[str, Any]] = [
+        {"point": [-40, -90, 600]},
+        {"wait": 0.2},
+        {"offset": {"xyz": tool, "frame": "tool"}},
+        {"offset": {"xyz": base}},
+    ]
+    plan = armkin.path(three_dof, {"moves": moves, "start": "home"})
+    begin = plan.runs[0].start_joints
+    degrees = np.rad2deg(begin).tolist()
+    assert np.abs(begin - armkin.ik(three_dof, [-40, -90, 600], near=three_dof.home).best).max() > 0.1
+    approach = armkin.path(three_dof, {"moves": [{"joint": degrees}], "start": "home"})
+    alone = armkin.path(three_dof, {"moves": moves[1:], "start": {"joints": degrees}})
+    assert plan.length == pytest.approx(alone.length) == pytest.approx(np.linalg.norm(tool) + np.linalg.norm(base))
+    assert (plan.samples, len(plan.runs)) == (alone.samples, 1)
+    assert plan.duration == pytest.approx(approach.duration + alone.duration)
