@@ -1,5 +1,5 @@
 /* Whether a posture may keep its target a quarter of the way to another, each joint at a constant pace, those that turn by about
-   half a turn either way: `_reached_straight` in Python. slack: how much it may miss there. */
+   half a turn either way: `_moves_straight` in Python. slack: how much it may miss there. */
 ARM_SELDOM static int arm_straight(const double *goal, const double *from, const double *way, double slack)
 {
     static const double unit[ARM_JOINTS] = {@unit@};

@@ -38,7 +38,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
     """
     _, _, target, near = goals
     doubts = _doubted_targets(goals, runner, rows)
-    parts, pending = _on_linkages(goals, runner, doubts), np.ones(len(rows), bool)
+    parts, pending = _linkage_seeds(goals, runner, doubts), np.ones(len(rows), bool)
     for part_rows, seeds in parts:
         pending[part_rows] = False
         if runner.geometry.ends:
@@ -70,7 +70,7 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
     return examine_targets(goals, batch, rows, seeds, runner.others, unsettled)
 
 
-def _on_linkages(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
+def _linkage_seeds(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:
     """The targets whose self-motions have a closed form, with their seeds."""
     decided: list[tuple[Int, Seeds]] = []
     if not (goals.task.constraints == goals.arm.n and goals.task.orientation == "full"):

@@ -114,8 +114,8 @@ class OneTarget:
     def _branch_at_near(self, near: list[float], legal: list[float], solving: list[int]) -> int | None:
         """Which of the solving branches, at their nearest legal copies, is at `near`; None if none is."""
         for place, b in enumerate(solving):
-            ways = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
-            if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= bound for v, c, j, bound in ways):
+            differences = zip(self._rows[b](legal), near, self._joints, self._close, strict=False)
+            if all(abs(v - c if j[2] else math.remainder(v - c, TURN)) <= bound for v, c, j, bound in differences):
                 return place
         return None
 
@@ -129,9 +129,9 @@ class OneTarget:
         legal: list[float] = []
         inside: list[bool] = []
         near_numbers = near.tolist()
-        for value, close, joint, plain in zip(values, near_numbers, self._joints, self._plain, strict=False):
+        for value, reference, joint, plain in zip(values, near_numbers, self._joints, self._plain, strict=False):
             for v in (value,) if plain else value:
-                copy, fits = nearest_number(v, close, *joint)
+                copy, fits = nearest_number(v, reference, *joint)
                 legal.append(copy)
                 inside.append(fits)
         B, n, count = self.count, self._n, len(solving)
@@ -148,10 +148,10 @@ class OneTarget:
             if near_branch is None:
                 return None
             q[near_branch], within[near_branch] = near, True
-        none = B - count
+        missing = B - count
         block = np.array([
-            *[True] * count, *[False] * none, *within, *[False] * none,
-            *(solving if self._ordered else range(count)), *[-1] * none,
+            *[True] * count, *[False] * missing, *within, *[False] * missing,
+            *(solving if self._ordered else range(count)), *[-1] * missing,
             *[False] * n, Status.EXACT if count else Status.UNREACHABLE, self._complete,
         ], np.int8)  # fmt: skip
         flags = block.view(np.bool_)

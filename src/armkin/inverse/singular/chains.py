@@ -13,7 +13,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.local_structure import Structure, leave_spans, members, stretch
+from armkin.inverse.singular.local_structure import Structure, leave_spans, members, structure_ahead
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
@@ -58,7 +58,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         if not len(chains):
             break
         row, start = posture[chains], end[chains]
-        link = stretch(arm, task, start, target[row], span[chains], heading[chains])
+        link = structure_ahead(arm, task, start, target[row], span[chains], heading[chains])
         holds = link.followed & (link.second > tol.HIGH)
         span[chains] *= link.span_ratio
         link_end, link_heading = leave_spans(arm, link, np.arange(len(chains)), start, link.v)
@@ -66,8 +66,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         opposite = (chains + len(begun)) % len(posture)
         opposite_start = end[opposite]
         end[chains[holds]], heading[chains[holds]] = link_end[holds], link_heading[holds]
-        others = np.concatenate([peers[row], opposite_start[:, None], end[opposite][:, None]], axis=1)
-        passed = members(link, np.arange(len(chains)), newton.difference(arm, others, start[:, None])) & holds[:, None]
+        tested = np.concatenate([peers[row], opposite_start[:, None], end[opposite][:, None]], axis=1)
+        passed = members(link, np.arange(len(chains)), newton.difference(arm, tested, start[:, None])) & holds[:, None]
         np.logical_or.at(in_chains, row, passed[:, :-2])
         shift = newton.difference(arm, start, q[row])
         np.minimum.at(least_way, row[holds], (shift + link.least_way)[holds])

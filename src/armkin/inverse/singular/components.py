@@ -27,8 +27,8 @@ AT_ONCE = 128  # candidates from which on asking all together is cheaper than on
 FEW_CANDIDATES = 24  # candidates of a target that are compared all with all
 PATIENCE = 6  # steps with hardly any gain after which a candidate is left where it is
 
-# For targets (R, ...), preferred values (R, n) and whether branches seem lost (R,): more postures (R, M, n), their
-# branches (M,), and of which targets (R,) these may not lead to all.
+# Takes targets (R, ...), preferred values (R, n) and whether branches seem lost (R,); returns more postures (R, M, n),
+# their branches (M,), and of which targets (R,) a search from many starts may find others.
 More = Callable[[Array, Array, Bool], tuple[Array, Int, Bool]]
 
 
@@ -37,10 +37,10 @@ def examine(
 ) -> Examined:
     """Correct, group and classify candidate branches of doubted targets.
 
-    goals: K targets; `near` is a branch itself where it solves its target. more: other candidates, for
-    targets that seem to have no branch, for those of which the preferred value leaves the other joints no solution,
-    and for self-motions that may meet others; unsettled: (K,) targets whose candidates may not be all, of a solver
-    that loses singular ones: more are asked for these and for what is singular, as of lost ones for incomplete (K,).
+    goals: K targets; `near` is a branch itself where it solves its target. more: finds other candidates, for targets
+    that seem to have no branch, for those of which the preferred value leaves the other joints no solution, and for
+    self-motions that may meet others. unsettled: (K,) targets whose solver may have lost singular candidates: `more`
+    is called for these, and for all that are singular. incomplete: (K,) targets that `more` takes for lost.
     """
     state = _settle_seeds(goals, seeds, tol.SEED)
     retry = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
@@ -254,22 +254,22 @@ class _Groups(_Components):
         motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
         cost = np.where(moving[:, None], np.where(on_motion, motion, np.inf), np.where(group, size, np.inf))
         pick = cost.argmin(axis=1)
-        own = np.flatnonzero(label[k, b] == OWN_LABEL)
-        pick[own] = b[own]
+        leads_own = np.flatnonzero(label[k, b] == OWN_LABEL)
+        pick[leads_own] = b[leads_own]
         self.chosen[k, pick] = unlisted
         self.chosen_joints[k, pick] = joints & moving[:, None]
         for array in (self.known, self.on_manifold, self.component_row, self.ended, self.uncrossed):
             array[k, pick] = array[k, b]
-        if len(own):  # named like the candidate of its group that is closest to it
-            motion = np.where(group[own] & (label[k[own]] != OWN_LABEL), motion[own], np.inf)
-            twin_label = label[k[own], motion.argmin(axis=1)]
-            label[k[own], b[own]] = np.where(np.isinf(motion.min(axis=1)), OWN_LABEL, twin_label)
+        if len(leads_own):  # named like the candidate of its group that is closest to it
+            motion = np.where(group[leads_own] & (label[k[leads_own]] != OWN_LABEL), motion[leads_own], np.inf)
+            twin_label = label[k[leads_own], motion.argmin(axis=1)]
+            label[k[leads_own], b[leads_own]] = np.where(np.isinf(motion.min(axis=1)), OWN_LABEL, twin_label)
 
     def _on_motion(self, k: Int, b: Int, offset: Array, group: Bool) -> Bool:
         """Which candidates (m, M) lie on the self-motions of those that lead, besides those `group` with them (m, M).
 
-        Whatever differs in its free joints alone; but where the residual grows along it at all, its points are not
-        equal, and the exact ones are listed.
+        A candidate is on one if it differs in the joints that move alone. Where the residual grows along a self-motion
+        its points are not equal, and the exact ones are listed.
         """
         arm, task, target, _ = self.goals
         q, joints = self.candidates.q, self.moving_joints[k, b]
@@ -301,9 +301,9 @@ class _Groups(_Components):
         self_motions.drop_twins(goals, q, chosen, curve, ended, linked, self.tube[rows])
         self.chosen[rows] = chosen
 
-    def settle(self, missed: Bool, beyond: Bool) -> Examined:
-        """Tell components, group candidates that are one, drop what self-motions contain; missed, beyond: (K,) of which
-        targets a loose candidate came to nothing, and of which all that are near lie beyond a fold."""
+    def settle(self, missed: Bool, all_beyond: Bool) -> Examined:
+        """Tell components, group candidates that are one, drop what self-motions contain. Of targets (K,), missed: a
+        loose candidate came to nothing; all_beyond: all candidates that are near lie beyond a fold."""
         is_few = self.valid.shape[1] <= FEW_CANDIDATES
         # candidates that lose several directions are followed once they lead; among many, those that lose one, too
         unfollowed = ~self.followed & (self.lost.nullity < 2)
@@ -341,7 +341,7 @@ class _Groups(_Components):
         listed = np.where(present[:, :, None], q[every, order], np.nan)
         label = np.where(present, self.candidates.label[every, order], OWN_LABEL)
         moved = np.asarray((self.chosen_joints & ~self.uncrossed[:, :, None]).any(axis=1))
-        return Examined(listed, present, label, status, self.free_joints, missed, surface, moved, beyond)
+        return Examined(listed, present, label, status, self.free_joints, missed, surface, moved, all_beyond)
 
 
 def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
@@ -373,13 +373,13 @@ def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
     q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
     missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~present).any(axis=1)
     is_useless = is_beyond | (size > seed_limit) | np.isnan(q[..., 0])
-    beyond = is_beyond.any(axis=1) & is_useless[:, 1:].all(axis=1)
+    all_beyond = is_beyond.any(axis=1) & is_useless[:, 1:].all(axis=1)
     rests: Bool = np.zeros(size.shape, bool)
     lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     if (lost.nullity[:, 1:] > 1).any():
-        q, label, size, rests = meetings.ways_out(goals, q, label, size, lost)
+        q, label, size, rests = meetings.separate(goals, q, label, size, lost)
         if q.shape[1] > sure.shape[1]:
             sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
             lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
     candidates = _Candidates(q, label, size, sure, simple)
-    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(beyond))
+    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(all_beyond))

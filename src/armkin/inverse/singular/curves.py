@@ -43,39 +43,39 @@ class Step(NamedTuple):
 
 
 class Curves:
-    """Curves through postures q (M, n), followed along `ahead` (M, n); joints: (M, n) those that move.
+    """Curves through postures q (M, n), followed along heading (M, n); joints: (M, n) those that move.
 
-    at: (M, n) where they are. going: (M,) those that are not at their end; a caller may end others. closed: (M,) those
-    that came back. Where several directions are lost a curve goes straight on.
+    q: (M, n) how far they are followed. active: (M,) those that are not at their end; a caller may end others. closed:
+    (M,) those that came back. Where several directions are lost a curve goes straight on.
     """
 
-    def __init__(self, arm: Arm, task: Task, q: Array, joints: Bool, target: Array, ahead: Array) -> None:
+    def __init__(self, arm: Arm, task: Task, q: Array, joints: Bool, target: Array, heading: Array) -> None:
         self._arm, self._task = arm, task
         self._joints, self._target = joints, target
-        self._start, self._ahead, self._taken = q, ahead, np.zeros(len(q), int)
-        self._pace = _longest_steps(_onto_curve(arm, task, q, joints, target)[2])
-        self.at, self.going, self.closed = q.copy(), np.ones(len(q), bool), np.zeros(len(q), bool)
+        self._start, self._heading, self._steps = q, heading, np.zeros(len(q), int)
+        self._length = _longest_steps(_onto_curve(arm, task, q, joints, target)[2])
+        self.q, self.active, self.closed = q.copy(), np.ones(len(q), bool), np.zeros(len(q), bool)
 
     def step(self) -> Step:
-        """One step of all that are going; one that leads off its curve is not taken, and the next is half as long."""
-        rows = np.flatnonzero(self.going)
+        """One step of all that are active; one that leads off its curve is not taken, and the next is half as long."""
+        rows = np.flatnonzero(self.active)
         arm, joints = self._arm, self._joints[rows]
-        last_direction, pace = self._ahead[rows], self._pace[rows]
-        start = self.at[rows] + pace[:, None] * last_direction * radian_or_reach(arm)
+        last_heading, length = self._heading[rows], self._length[rows]
+        start = self.q[rows] + length[:, None] * last_heading * radian_or_reach(arm)
         landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
-        direction = _next_directions(V, second, last_direction)
-        cosine = np.linalg.norm(direction, axis=1)
+        heading = _next_directions(V, second, last_heading)
+        cosine = np.linalg.norm(heading, axis=1)
         good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
-        last_q = self.at[rows]
-        self.at[rows[good]], self._ahead[rows[good]] = landed[good], direction[good] / cosine[good, None]
-        self._pace[rows] = pace = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * pace)
-        self._taken[rows] += 1
-        is_stuck, is_long = ~good & (pace < tol.SHORTEST_STEP), self._taken[rows] == MAX_STEPS
+        last_q = self.q[rows]
+        self.q[rows[good]], self._heading[rows[good]] = landed[good], heading[good] / cosine[good, None]
+        self._length[rows] = length = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * length)
+        self._steps[rows] += 1
+        is_stuck, is_long = ~good & (length < tol.SHORTEST_STEP), self._steps[rows] == MAX_STEPS
         unsure = (second < tol.CROSSING) | (is_stuck & (size < tol.OFF_CURVE)) | is_long
-        step = Step(rows, last_q, newton.difference(arm, self.at[rows], last_q), np.asarray(unsure))
+        step = Step(rows, last_q, newton.difference(arm, self.q[rows], last_q), np.asarray(unsure))
         at_start = step.passes(arm, self._start[rows], np.arange(len(rows)))
-        self.closed[rows] = at_start & good & (self._taken[rows] > 2)
-        self.going[rows] = ~(self.closed[rows] | is_stuck | is_long)
+        self.closed[rows] = at_start & good & (self._steps[rows] > 2)
+        self.active[rows] = ~(self.closed[rows] | is_stuck | is_long)
         return step
 
 
@@ -143,9 +143,9 @@ def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
 
     The second half of `walk` are the same curves the other way: they tell nothing more once the first half has closed.
     """
-    M, P = len(walk.at) // 2, len(curve)
+    M, P = len(walk.q) // 2, len(curve)
     curve_way, met = np.concatenate([curve, curve + M]), np.zeros(2 * P, bool)
-    while walk.going.any():
+    while walk.active.any():
         step = walk.step()
         unsure = np.zeros(2 * M, bool)
         unsure[step.rows] = step.unsure
@@ -153,5 +153,5 @@ def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
         row = curve_way[unmet]
         met[unmet] = step.passes(arm, posture[unmet % P], np.searchsorted(step.rows, row)) | unsure[row]
         has_unmet = np.bincount(curve[~(met[:P] | met[P:])], minlength=M) > 0
-        walk.going &= np.concatenate([has_unmet, has_unmet & ~walk.closed[:M]])
+        walk.active &= np.concatenate([has_unmet, has_unmet & ~walk.closed[:M]])
     return np.asarray(met[:P] | (met[P:] & ~walk.closed[curve]))

@@ -81,8 +81,8 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
         return np.zeros(len(q), bool)
     r, J = newton.scaled(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
-    u, way = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
-    ends = np.concatenate([q + way, q - way])
+    u, step = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
+    ends = np.concatenate([q + step, q - step])
     goals = np.concatenate([target, target])
     forward, backward = np.split(newton.residuals(arm, task, ends, goals), 2)
     bend = (u * (forward + backward - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2

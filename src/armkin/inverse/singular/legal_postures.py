@@ -110,7 +110,7 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     goal = np.repeat(target[None], len(directions), axis=0)
     walk = Curves(arm, task, np.tile(q, (len(directions), 1)), np.ones(directions.shape, bool), goal, directions)
     stretches = [np.empty((0, arm.n))]
-    while walk.going.any():
+    while walk.active.any():
         step = walk.step()
         count = max(int(np.ceil(np.abs(step.chord).max() / FINE_STEP)), 1)
         share = (np.arange(count) / count)[:, None, None]
@@ -119,5 +119,5 @@ def follow_self_motion(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         landed, size = newton.correct(arm, task, between, goal, steps=6, least=tol.WEAK)
         on_target = size <= tol.SOLUTION
         stretches.append(landed[on_target])
-        walk.going[step.rows] &= on_target.reshape(count, -1).all(axis=0)  # what else is near is no part of it
+        walk.active[step.rows] &= on_target.reshape(count, -1).all(axis=0)  # what else is near is no part of it
     return np.concatenate(stretches)

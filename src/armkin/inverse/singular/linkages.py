@@ -76,7 +76,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     np.put_along_axis(listed, order, leads, axis=1)
     listed &= key < 2 * B
     if (stands := decided & (near_miss <= tol.CLOSED)).any():
-        decided &= _listed_as_near(goals, q, listed, key, motions, leader, loose, stands)
+        decided &= _list_near(goals, q, listed, key, motions, leader, loose, stands)
     decided &= _one_direction(goals, q, listed & decided[:, None], key)
     listed &= decided[:, None]
     q[~listed] = np.nan
@@ -148,7 +148,7 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
     return regular
 
 
-def _listed_as_near(
+def _list_near(
     goals: Goals, q: Array, listed: Bool, key: Int, motions: _Motions, leader: Int, loose: Bool, stands: Bool
 ) -> Bool:
     """Put `near` in place of what is listed of the self-motion that it is on; (K,) False where it may be on another.

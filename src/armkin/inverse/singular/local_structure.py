@@ -114,7 +114,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
     return curve
 
 
-def stretch(arm: Arm, task: Task, q: Array, target: Array, span: Array, heading: Array) -> Structure:
+def structure_ahead(arm: Arm, task: Task, q: Array, target: Array, span: Array, heading: Array) -> Structure:
     """The curves through postures (M, n), the way that heading (M, n) points, as far as span (M,)."""
     linear = newton.Linear.linearise(arm, task, q, target)
     linear.V[(linear.V[:, -1] * heading).sum(axis=1) < 0.0, -1] *= -1.0

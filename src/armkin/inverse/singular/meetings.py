@@ -31,7 +31,7 @@ THIRD = 0.03  # singular value of the third direction, which bends the curves by
 SPREAD = 5.0  # factor on that curvature in some direction: no surface of solutions, and the zeros are clear
 
 
-def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:
+def separate(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
     The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
@@ -46,7 +46,7 @@ def ways_out(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     _, first, group = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
     most = np.maximum(tol.ACCEPTED, 2.0 * size[row, b[first]])
-    meet, ends, rests = _steps_out(arm, task, q[row, b[first]], rows_of(weak, first), nullity[first], target[row], most)
+    meet, ends, rests = _step_out(arm, task, q[row, b[first]], rows_of(weak, first), nullity[first], target[row], most)
     size[k, b] = np.where(np.isin(group.reshape(-1), meet), np.inf, size[k, b])
     order = np.argsort(row[meet], kind="stable")
     meet, ends = meet[order], ends[order]
@@ -131,7 +131,7 @@ def _curve_tangents(
     return decided, np.concatenate(meetings), np.concatenate(directions)
 
 
-def _steps_out(
+def _step_out(
     arm: Arm, task: Task, q: Array, linear: newton.Linear, nullity: Int, target: Array, limit: Array
 ) -> tuple[Int, Array, Bool]:
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).

@@ -37,12 +37,12 @@ def at_tip(
     how far off they may be [reaches], by default `ROOM`.
     """
     point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    most = ROOM * arm.reach if room is None else room * arm.reach
+    limit = ROOM * arm.reach if room is None else room * arm.reach
     x = point[:, 0] if first is None else first
-    rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= most)  # one coordinate tells nearly all others
+    rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= limit)  # one coordinate tells nearly all others
     if len(rows):
         distance = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
-        rows = rows[distance.max(axis=1) <= (most if isinstance(most, float) else most[rows])]
+        rows = rows[distance.max(axis=1) <= (limit if isinstance(limit, float) else limit[rows])]
     return rows
 
 
@@ -82,28 +82,28 @@ def _put_near_in_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
     return np.asarray(rows[solves & ~has_branch])
 
 
-def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, most: Array) -> Int:
-    """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within most (N,) [reaches, rad].
+def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, bounds: Array) -> Int:
+    """Which targets (N, ...) are solved by `near` (n,) or (N, n), within limits, to within bounds (N,) [reaches, rad].
 
     Of those that are known better than to `SOLUTION` there are none: of these `put_near` has decided.
     """
-    rounded = most > ROUNDED
-    if not rounded.any():
-        return np.flatnonzero(rounded)
-    close = np.broadcast_to(near, (len(target), arm.n))
-    rows = at_tip(arm, task, target, position(arm, near), room=np.where(rounded, most, -1.0))
-    rows = rows[~limits.outside_limits(arm, close[rows]).any(axis=1)]
-    return np.asarray(rows[newton.misses(arm, task, close[rows], target[rows]) <= most[rows]])
+    is_rounded = bounds > ROUNDED
+    if not is_rounded.any():
+        return np.flatnonzero(is_rounded)
+    nears = np.broadcast_to(near, (len(target), arm.n))
+    rows = at_tip(arm, task, target, position(arm, near), room=np.where(is_rounded, bounds, -1.0))
+    rows = rows[~limits.outside_limits(arm, nears[rows]).any(axis=1)]
+    return np.asarray(rows[newton.misses(arm, task, nears[rows], target[rows]) <= bounds[rows]])
 
 
-def list_near(goals: Goals, batch: Batch, most: Array) -> Batch:
+def list_near(goals: Goals, batch: Batch, bounds: Array) -> Batch:
     """The branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
 
     In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
     others, the target is a boundary.
     """
     arm, task, target, near = goals
-    rows = solved_by_near(arm, task, target, near, most)
+    rows = solved_by_near(arm, task, target, near, bounds)
     if not len(rows):
         return batch
     offset = newton.difference(arm, batch.q[rows], near[rows, None])
@@ -116,7 +116,7 @@ def list_near(goals: Goals, batch: Batch, most: Array) -> Batch:
         halfway = near[rows[k]] + 0.5 * offset[k, b] * radian_or_reach(arm)
         between, size = pull_back(arm, task, halfway, target[rows[k]], steps)
         deviation = newton.wrapped_distance(arm, between, halfway)
-        is_one[k, b] = (size <= most[rows[k]]) & (deviation <= BESIDE_SHARE * distance[k, b])
+        is_one[k, b] = (size <= bounds[rows[k]]) & (deviation <= BESIDE_SHARE * distance[k, b])
     place, has_branch = np.where(is_one, distance, np.inf).argmin(axis=1), is_one.any(axis=1)
     count = batch.valid[rows].sum(axis=1)
     place = np.where(has_branch, place, count)

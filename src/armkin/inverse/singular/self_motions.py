@@ -49,11 +49,11 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
                 chosen[k, i] = False
     if pairs:
         row, root, mate = np.array(pairs).T
-        same = _grows_from(arm, task, q[row, root], q[row, mate], curve[row, mate], target[row]) & (root > 0)
+        same = _joins_motion(arm, task, q[row, root], q[row, mate], curve[row, mate], target[row]) & (root > 0)
         chosen[row[same], root[same]] = False
 
 
-def _grows_from(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, target: Array) -> Bool:
+def _joins_motion(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, target: Array) -> Bool:
     """Whether q (M, n) are one with self-motions: with the postures that have their values of the joints that move.
 
     motions: (M, n) postures of self-motions, curve: (M, n) the joints that these move. Two are one if the posture
@@ -103,7 +103,7 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
     is_slow = ~is_close & (most_turned > tol.TURNED) & (most_turned < tol.DRIFT)
     is_close |= np.equal(j, 0)  # `near` stands for all that meet there
     unsure = np.flatnonzero(is_close & ~is_one)
-    is_one[unsure] = _reached_straight(arm, task, start[unsure], offset[unsure], target[k[unsure]])
+    is_one[unsure] = _moves_straight(arm, task, start[unsure], offset[unsure], target[k[unsure]])
     slow = np.flatnonzero(is_slow & ~is_one)
     if len(slow):  # whether the self-motion of the one goes round to the other
         joints = curve[k[slow], i[slow]] | (distance[slow] > tol.SAME)
@@ -117,7 +117,7 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
         chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
 
 
-def _reached_straight(arm: Arm, task: Task, q: Array, offset: Array, target: Array) -> Bool:
+def _moves_straight(arm: Arm, task: Task, q: Array, offset: Array, target: Array) -> Bool:
     """Whether the joints can move from q (M, n) to q + offset, each at a constant pace, and keep the target: (M,).
 
     A quarter, half and three quarters of it are asked, each way round for joints that turn by about 180 degrees.
