@@ -69,17 +69,17 @@ def searches(
     """
     for name in names:
         joint_index(arm, name)
-    joints = [joint for joint, name in enumerate(arm.joint_names) if not names or name in names]
-    joints = [joint for group in _coupled_groups(arm, joints) for joint in group]
-    orders = _homing_orders(arm, joints, rest_at_home=rest_at_home)
+    joint_numbers = [joint for joint, name in enumerate(arm.joint_names) if not names or name in names]
+    joint_numbers = [joint for group in _coupled_groups(arm, joint_numbers) for joint in group]
+    orders = _homing_orders(arm, joint_numbers, rest_at_home=rest_at_home)
     ordered = sorted(orders, key=lambda joint: (orders[joint] is None, orders[joint] or 0, joint))
     return [_search_of(arm, configuration, joint) for joint in ordered]
 
 
-def _homing_orders(arm: Arm, joints: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
+def _homing_orders(arm: Arm, joint_numbers: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
     """{joint: order} of the joints with a homing. Raises NoHomingError for others, unless they rest at home."""
-    orders = {joint: homing.order for joint in joints if (homing := arm.homing[joint]) is not None}
-    without_homing = [arm.joint_names[joint] for joint in joints if joint not in orders]
+    orders = {joint: homing.order for joint in joint_numbers if (homing := arm.homing[joint]) is not None}
+    without_homing = [arm.joint_names[joint] for joint in joint_numbers if joint not in orders]
     if without_homing and not (rest_at_home and orders):
         raise NoHomingError(
             f"{arm.path} has no homing for {', '.join(without_homing)}",
@@ -194,9 +194,9 @@ def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequ
     return level
 
 
-def _coupled_groups(arm: Arm, joints: Sequence[int]) -> list[list[int]]:
+def _coupled_groups(arm: Arm, joint_numbers: Sequence[int]) -> list[list[int]]:
     """Groups of joints that share motors and so home together, in file order."""
-    remaining, groups = set(joints), []
+    remaining, groups = set(joint_numbers), []
     while remaining:
         group = {min(remaining)}
         while True:

@@ -84,12 +84,12 @@ Text = tuple[tuple[str, ...], str, str]  # `Solutions.names`, method and why
 
 
 def as_solutions(
-    goals: Goals, near: Array, lead: tuple[int, ...], batch: Batch, rounding: Array, text: Text
+    goals: Goals, near: Array, batch_shape: tuple[int, ...], batch: Batch, rounding: Array, text: Text
 ) -> Solutions:
-    """The answer of a batch of shape lead; near: (n,) or (*lead, n), as it was given."""
+    """The answer of a batch of shape batch_shape; near: (n,) or (*batch_shape, n), as it was given."""
     arm, task, target, _ = goals
-    reference = np.broadcast_to(near.copy(), (*lead, arm.n))
-    shaped = (x.reshape((*lead, *x.shape[1:])) for x in (*batch, target, rounding))
+    reference = np.broadcast_to(near.copy(), (*batch_shape, arm.n))
+    shaped = (x.reshape((*batch_shape, *x.shape[1:])) for x in (*batch, target, rounding))
     q, valid, within, branch, status, free, complete, target, rounding = shaped
     return Solutions(arm, task, target, reference, q, valid, within, branch, status, free, *text, complete, rounding)
 

@@ -58,12 +58,12 @@ def families(
         return _with_tool_turn(ik, arm, free, targets, near, rounding)
     task = free.task
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
-    goal, lead, defect = read_targets(task, values)
-    reference = read_near(arm, near, lead)
+    goal, batch_shape, defect = read_targets(task, values)
+    reference = read_near(arm, near, batch_shape)
     nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(goal), arm.n))
     srs = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
-    roundings, limit = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, lead)
+    roundings, limit = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, batch_shape)
     stands = (newton.misses(arm, task, nears, goal) <= limit) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, free.joint, nears, stands)
     followed = AT_ONCE // SAMPLES if free.by_formula else TRACED
@@ -85,7 +85,7 @@ def families(
     names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
     method, why, _ = method_of_families(arm, free)
     batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
-    s = as_solutions(Goals(arm, task, goal, nears), reference, lead, batch, roundings, (names, method, why))
+    s = as_solutions(Goals(arm, task, goal, nears), reference, batch_shape, batch, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
@@ -94,10 +94,10 @@ def _with_tool_turn(
 ) -> Solutions:
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
     r = free.joint
-    lead = flat_targets(free.task, arrays.real_array(targets, "targets"))[1]
-    reference = read_near(arm, near, lead)
+    batch_shape = flat_targets(free.task, arrays.real_array(targets, "targets"))[1]
+    reference = read_near(arm, near, batch_shape)
     s = ik(free.rest, targets, free.task.name, near=np.delete(reference, r, axis=-1), rounding=rounding)
-    reference = np.broadcast_to(reference, (*lead, arm.n)).copy()
+    reference = np.broadcast_to(reference, (*batch_shape, arm.n)).copy()
     value = np.clip(reference[..., r], arm.lower[r], arm.upper[r])[..., None]
     turns = arm.upper[r] - arm.lower[r] >= 2 * np.pi
     interval = np.full((*s.valid.shape, 2), np.nan)

@@ -16,7 +16,7 @@ from armkin.formula.arrays import Array, Bool
 from armkin.forward import fk
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find_branches
-from armkin.inverse.solve import isolated_branches as ik
+from armkin.inverse.solve import isolated_branches
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside_limits, outside_text
@@ -336,7 +336,7 @@ def _nearest_posture(walk: Walk, goal: Spot, branch: str | None) -> Array:
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, sorted by distance."""
     target = path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0]
-    solutions = ik(walk.arm, target, walk.task.name, near=walk.q)
+    solutions = isolated_branches(walk.arm, target, walk.task.name, near=walk.q)
     numbers = find_branches(solutions.names, branches) if (branches := branch or walk.options.branch) else None
     clear = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
     allowed = solutions.valid & solutions.within_limits & (True if clear is None else clear)
