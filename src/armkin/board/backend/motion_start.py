@@ -104,11 +104,6 @@ def excess_over_limits(arm: Arm, q: Array) -> Array:
     return np.abs(values - np.clip(values, arm.lower, arm.upper))
 
 
-def is_believable(arm: Arm, counts: Sequence[int]) -> bool:
-    """Whether an arm may stand at counts: no joint more than a turn (a slide: its travel) outside its limits."""
-    return why_impossible(arm, counts) is None
-
-
 def why_impossible(arm: Arm, counts: Sequence[int]) -> str | None:
     """Why an arm cannot stand at counts, in words; None: it can."""
     try:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-STATUS, HOLD, RESUME = b"?", b"!", b"~"  # these commands and the next two pass every queue
+STATUS, HOLD = b"?", b"!"  # these commands and the next two pass every queue
 RESET, JOG_CANCEL = b"\x18", b"\x85"
 PLAIN_FEED = b"\x90"  # command: no override of feeds
 LETTERS = "XYZABC"

@@ -25,11 +25,6 @@ def likely_ports() -> Iterable[str]:
     return [port.device for port in list_ports() if port.board]
 
 
-def foreign_ports() -> Iterable[str]:
-    """Names of the ports where a board with other firmware may be: Arduinos, and the chips of ESP32s and adapters."""
-    return [port.device for port in list_ports() if port.board or port.adapter]
-
-
 def _board_answers(name: str, number: int | None, baud: int, stop: Callable[[], bool], reset: bool) -> bool:
     """Whether a board with armkin's firmware, of a kind's number or any, answers on a port."""
     try:
