@@ -165,7 +165,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "shrink": local_structure.SHRINK, "bend": local_structure.BEND, "moved": MOVED,
         "same": SAME, "turned": TURNED, "drift": DRIFT,
         "nearer": local_structure.USED_SHARE, "shorter": local_structure.FAILED_RATIO,
-        "longest": local_structure.MAX_RATIO, "gain": local_structure.BOTH_WAYS.gain,
+        "longest": local_structure.MAX_RATIO,
     }  # fmt: skip
     fields = {name: number_text(value) for name, value in values.items()}
     fields["motions"] = str(int(not arm.keep_out))  # with keep-outs, Python searches a self-motion for a free posture
@@ -175,6 +175,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     tables = {"points": local_structure.POINTS, "last": local_structure.TO_LAST}
     sides = local_structure.BOTH_WAYS, local_structure.ONE_WAY
     tables |= {"nodes": np.stack([side.node for side in sides]), "fit": np.stack([side.to_powers for side in sides])}
+    tables["gains"] = np.array([side.gain for side in sides])
     fields |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
     fields |= {
         "nodes_count": str(local_structure.NODES),

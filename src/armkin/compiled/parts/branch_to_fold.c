@@ -66,7 +66,7 @@ ARM_SELDOM static double arm_to_curve(const double *T, const double *slope, cons
 ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const double *u, const double *w, arm_branch *out,
     double *g)
 {
-    static const double unit[ARM_JOINTS] = {@unit@}, nodes[2][ARM_NODES] = {@nodes@};
+    static const double unit[ARM_JOINTS] = {@unit@}, nodes[2][ARM_NODES] = {@nodes@}, gains[2] = {@gains@};
     static const double fits[2][ARM_NODES][ARM_NODES] = {@fit@}, last[2][ARM_NODES] = {@last@};
     double away[ARM_NODES][ARM_JOINTS + 1], at[ARM_JOINTS * ARM_POINTS], T[16 * ARM_POINTS], slope[6 * ARM_JOINTS * ARM_POINTS];
     double regular[ARM_NODES], before[ARM_NODES] = {0.0}, step, steepest = 0.0, off = 0.0;
@@ -109,7 +109,7 @@ ARM_SELDOM static int arm_polynomials(const double *q, const double *goal, const
             off = fmax(off, fabs(c) / most);
         }
     }
-    out->span_ratio = (out->only_ahead ? 1.0 : @gain@) * fmin(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @longest@) - @nearer@;
+    out->span_ratio = gains[out->only_ahead] * fmin(0.9 * pow(off, 1.0 / (2 - ARM_NODES)), @longest@) - @nearer@;
     if (!(off < 1.0)) /* the polynomials are exact on the span if their last coefficients are small */
         return 0;
     for (j = 0; j <= ARM_JOINTS; j++) {

@@ -57,17 +57,17 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     for count in range(1, LINKS + 1):
         if not len(chains):
             break
-        row, start = posture[chains], end[chains]
+        row, start, every = posture[chains], end[chains], np.arange(len(chains))
         link = structure_ahead(arm, task, start, target[row], span[chains], heading[chains])
         holds = link.followed & (link.second > tol.HIGH)
         span[chains] *= link.span_ratio
-        link_end, link_heading = leave_spans(arm, link, np.arange(len(chains)), start, link.v)
+        link_end, link_heading = leave_spans(arm, link, every, start, link.v)
         # a curve closes where its two sides meet: a step may pass where the other was, or now is
         opposite = (chains + len(begun)) % len(posture)
         opposite_start = end[opposite]
         end[chains[holds]], heading[chains[holds]] = link_end[holds], link_heading[holds]
         tested = np.concatenate([peers[row], opposite_start[:, None], end[opposite][:, None]], axis=1)
-        passed = members(link, np.arange(len(chains)), newton.difference(arm, tested, start[:, None])) & holds[:, None]
+        passed = members(link, every, newton.difference(arm, tested, start[:, None])) & holds[:, None]
         np.logical_or.at(in_chains, row, passed[:, :-2])
         shift = newton.difference(arm, start, q[row])
         np.minimum.at(least_way, row[holds], (shift + link.least_way)[holds])

@@ -54,7 +54,7 @@ class Structure(NamedTuple):
     least_way: Array  # (M, n) least value of each joint's way between low and high
     most_way: Array  # (M, n) greatest value
     followed: Bool  # whether the polynomials hold on the span
-    span_ratio: Array  # length of the longest span on which they are likely to hold, in spans
+    span_ratio: Array  # length that the next span, ahead of this one, is likely to have, in spans
     uncrossed: Bool  # whether no other curve crosses within the span
     v: Array  # (M, n) direction that is lost
     second: Array  # second smallest singular value
@@ -168,7 +168,7 @@ def _second_order(arm: Arm, task: Task, q: Array, target: Array, linear: newton.
     """Decide those whose curvature does: g = sigma t + b t^2 / 2, as far as that tells, at most `SERIES`.
 
     x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
-    close by, third from g at the ends, after steps back onto the curve; what these still miss is counted, too.
+    close by, the change of g'' from g where it decides, after steps back onto the curve; what these miss is counted.
     Where sigma^2 > 2 SOLUTION |g''| as far as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where
     sigma^2 < 2 SOLUTION |g''| as far as 4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
     Writes what is decided, the ends and the series to `curve`; returns w (M, n).
@@ -221,8 +221,8 @@ def _second_order(arm: Arm, task: Task, q: Array, target: Array, linear: newton.
 
 
 def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Bool, Array, Array]:
-    """Which curves (M,) stay at hand as far as their spans, how many times as long spans they may (M,), on which of
-    these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k)."""
+    """Which curves (M,) stay at hand as far as their spans, how many times as long the next ones may be (M,), on which
+    of these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k)."""
     n, rows, span = start.q.shape[1], start.u.shape[1], start.span
     holds, x, along_u, inverse = _solve_nodes(arm, task, start, side)
     # along the curve u turns: the inverse's last rows span what no motion across v reaches there
