@@ -7,8 +7,6 @@ when a file names a kind that armkin has not. The pin maps are the firmware's (`
 the two tables together.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points

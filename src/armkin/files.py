@@ -1,7 +1,5 @@
 """Writes files completely or not at all, and never over a robot file or a file that the command reads."""
 
-from __future__ import annotations
-
 import errno
 import os
 import re

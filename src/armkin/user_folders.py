@@ -4,8 +4,6 @@ Linux: ``$XDG_CACHE_HOME`` or ``~/.cache``, ``$XDG_STATE_HOME`` or ``~/.local/st
 ``%LOCALAPPDATA%``.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 import tempfile

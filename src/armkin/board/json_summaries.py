@@ -1,7 +1,5 @@
 """The JSON types of an arm's position and of the summary of a plan."""
 
-from __future__ import annotations
-
 from typing import Annotated, TypedDict
 
 from armkin.model.units import JointUnits

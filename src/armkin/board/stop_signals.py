@@ -1,7 +1,5 @@
 """Turns signals into a request to stop the arm before the program ends."""
 
-from __future__ import annotations
-
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -6,8 +6,6 @@ reconstruction, 1987). The scale comes from the median residual. Weights are com
 better fit may use a row again.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -7,8 +7,6 @@ chance is hard to estimate. Base and tool, usually the greatest errors, are then
 better and the rows determine them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Errors of the core advise what a program can do. This module replaces that by advice for a user at a terminal.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 

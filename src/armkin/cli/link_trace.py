@@ -3,8 +3,6 @@
 `send` has had another `--trace` for long, a plan as CSV: there it is `--log`, which the others take, too.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from functools import wraps

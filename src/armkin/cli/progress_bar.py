@@ -1,7 +1,5 @@
 """How far a long command has come, on a terminal: a bar, count, rate and time left (rich, imported here alone)."""
 
-from __future__ import annotations
-
 import sys
 
 from rich.console import Console

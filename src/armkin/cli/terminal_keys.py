@@ -1,7 +1,5 @@
 """Reads single keys of a terminal, and detects held keys, which a terminal repeats."""
 
-from __future__ import annotations
-
 import os
 import sys
 import time

@@ -4,8 +4,6 @@ The digits are those of Python's `repr`. Where pyarrow is installed it prints wh
 it prints in another way (whole numbers, small and large ones) is printed by Python, so that the bytes are the same.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from functools import cache

@@ -1,7 +1,5 @@
 """Single lines of CSV, without numpy: for what has few of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any
 

@@ -5,8 +5,6 @@ so that a part that is there is whole, whatever ended the run. `job.json` says w
 never mixed in. `lock` keeps two runs from one folder, and the system opens it when its run ends, however that ends.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Which file a name's ending means, and how chunks become such a file."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Columns of numbers from .npz, .parquet and .jsonl, some rows at a time."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import zipfile

@@ -1,7 +1,5 @@
 """Tables as numpy's .npz: one array a column."""
 
-from __future__ import annotations
-
 import io
 import json
 import zipfile

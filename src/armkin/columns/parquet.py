@@ -1,7 +1,5 @@
 """Tables as Parquet, by pyarrow: numbers without a value are null."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable, Iterable
 from typing import IO, Any

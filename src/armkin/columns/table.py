@@ -1,7 +1,5 @@
 """A table: columns of one length, by name, in the order in which they are written."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """`ik_columns.nearest_branches`, the branch that moves the joints least, by machine code with identical results."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 from functools import cache

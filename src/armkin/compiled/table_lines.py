@@ -1,7 +1,5 @@
 """Columns as lines of text by machine code: the bytes of `armkin.columns.csv_and_json_lines`, but faster."""
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 from collections.abc import Callable

@@ -6,8 +6,6 @@ only if its folder and file belong to this user and nobody else can write them; 
 builds its own library.
 """
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import os

@@ -4,8 +4,6 @@ If a worker is killed, the scheduler gives its chunks to another worker. If the 
 the client has all finished results. Every chunk carries the job as bytes, which a worker unpacks once.
 """
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 import platform

@@ -1,7 +1,5 @@
 """Runs chunks on an engine and returns their results in the order of the chunks."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple, TypeVar
 

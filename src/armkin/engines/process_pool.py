@@ -4,8 +4,6 @@ They are copies of this process, with all that it has loaded; a copy of a proces
 locks without the threads, so then new interpreters are started. When this process is killed, those of the pool end.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

@@ -1,7 +1,5 @@
 """avrdude, where it is on PATH."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

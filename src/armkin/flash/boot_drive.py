@@ -3,8 +3,6 @@
 Raspberry Pi Ltd, RP2040 datasheet, 2.8.4; https://github.com/microsoft/uf2 (INFO_UF2.TXT).
 """
 
-from __future__ import annotations
-
 import os
 import string
 import sys

@@ -1,7 +1,5 @@
 """The firmware's images: built by `scripts/release`, in the wheel beside this file, each with its checksum."""
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import NamedTuple

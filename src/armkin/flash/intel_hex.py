@@ -3,8 +3,6 @@
 Intel, Hexadecimal Object File Format Specification, 1988.
 """
 
-from __future__ import annotations
-
 
 def parse_intel_hex(text: str) -> bytes:
     """The bytes from address 0 on; between records 0xFF, as in empty flash.

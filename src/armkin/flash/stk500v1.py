@@ -1,7 +1,5 @@
 """The boot loader of the Uno (optiboot): STK500, version 1 (Atmel AVR061), as far as it understands it."""
 
-from __future__ import annotations
-
 import time
 
 from armkin.board.ports import Port

@@ -1,7 +1,5 @@
 """The boot loader of the Mega 2560: STK500, version 2 (Atmel AVR068), as far as it understands it."""
 
-from __future__ import annotations
-
 import time
 from functools import reduce
 from operator import xor

@@ -1,7 +1,5 @@
 """A board's image onto it: which boot loader its chip has, what answers there, and the board's own word at the end."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from contextlib import suppress

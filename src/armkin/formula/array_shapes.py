@@ -3,8 +3,6 @@
 All names are `Array` for the type checker and at run time; they only inform the reader.
 """
 
-from __future__ import annotations
-
 from armkin.formula.arrays import Array
 
 Joints = Array  # (..., n) joint values [rad | mm]

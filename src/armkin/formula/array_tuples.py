@@ -1,7 +1,5 @@
 """Named tuples of arrays with a row for each target or candidate: selecting, stacking and replacing rows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, TypeVar
 

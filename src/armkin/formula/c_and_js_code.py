@@ -4,8 +4,6 @@ The lines are plain expressions without branches or memory, so that compilers tu
 vector instructions.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import partial

@@ -1,7 +1,5 @@
 """A recording as numpy code: one call a line, into buffers that are used again and again."""
 
-from __future__ import annotations
-
 import math
 import operator
 from collections.abc import Callable, Iterator

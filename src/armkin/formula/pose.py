@@ -8,8 +8,6 @@ A `Pose` is a list of twelve entries ``[r00, r10, r20, r01, r11, r21, r02, r12, 
 the x, y and z columns of the rotation, then the position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Writes a recording as plain Python, because for one pose the calls of numpy would cost most of the time."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Callable

@@ -4,8 +4,6 @@ It also handles joints that are held or swept. While `ik` returns arrays, these 
 and degrees (`armkin.model.units`).
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

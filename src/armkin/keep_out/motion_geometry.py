@@ -3,8 +3,6 @@
 A place is a number: its whole part is the index of a cell, the rest the share of that cell.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol

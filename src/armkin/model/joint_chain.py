@@ -1,7 +1,5 @@
 """Chains of joints for the solvers of `armkin.ik`, and their reversal."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rotations as matrices, roll, pitch, yaw and quaternions; rigid transforms."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Paths as CSV: one row a corner, lines between them; columns are chosen by the names in the header."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

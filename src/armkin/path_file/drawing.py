@@ -1,7 +1,5 @@
 """What foreign files draw, as the moves of a path: points in the file's millimetres, placed in the arm's frame."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -3,8 +3,6 @@
 Source of the meanings: Kramer, Proctor and Messina, The NIST RS274NGC Interpreter, 2000, section 3.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable
 

@@ -1,7 +1,5 @@
 """Arcs of G-code: the circle of G2 and G3, by its centre or its radius."""
 
-from __future__ import annotations
-
 import math
 
 from armkin.path_file.drawing import Point

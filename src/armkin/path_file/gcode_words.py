@@ -1,7 +1,5 @@
 """G-code, line by line, as words: a letter and a number each."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

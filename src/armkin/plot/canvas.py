@@ -1,7 +1,5 @@
 """matplotlib, imported when the first picture is drawn: figures, true proportions, files."""
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Chooses the best place: most targets reached, then greatest margin, then greatest distance to joint limits."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

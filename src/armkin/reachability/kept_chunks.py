@@ -1,7 +1,5 @@
 """Keeps the results of chunks beside the file that they become, so that an interrupted run can be resumed."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager

@@ -4,8 +4,6 @@ A wheel holds them in ``armkin/robots`` (pyproject.toml, force-include); a clone
 them in ``robots`` at its top.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A robot file written from a DH table: complete as far as the table goes, the rest as comments to fill in."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A robot file's text with other values: comments, order and spelling of all else stay."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ Numbers are written without exponents (``1e-05`` is text to YAML 1.1) and with a
 written as xyz and roll, pitch, yaw from which its matrix comes back to rounding.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Scenes: keep-outs in a file of their own, which are added to those of a robot file."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from operator import itemgetter

@@ -8,8 +8,6 @@ A joint's origin and axis in the base frame, when all joints are 0, are its scre
 beyond 1e-12 mm.
 """
 
-from __future__ import annotations
-
 import math
 import os
 import re

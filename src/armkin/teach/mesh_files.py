@@ -3,8 +3,6 @@
 Collada: https://www.khronos.org/files/collada_spec_1_4.pdf; `up_axis` is ignored, as in RViz.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Access control: requests of another origin, a rebound name or a program without the key are refused."""
 
-from __future__ import annotations
-
 import hmac
 import secrets
 from collections.abc import Mapping

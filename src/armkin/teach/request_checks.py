@@ -1,7 +1,5 @@
 """Checks of a request's body and fields."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -3,8 +3,6 @@
 Each answer is one write: with headers and body apart, Nagle's algorithm and delayed acknowledgements would cost 40 ms.
 """
 
-from __future__ import annotations
-
 import json
 import secrets
 import select

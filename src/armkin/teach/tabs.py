@@ -1,7 +1,5 @@
 """The open pages: one holds control, the others watch; each gets the newest message of every topic."""
 
-from __future__ import annotations
-
 import secrets
 import threading
 import time

@@ -6,8 +6,6 @@
 Length is the number of bytes behind it; the checksum is the complement of the sum from `id` on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from enum import IntEnum
 from typing import NamedTuple

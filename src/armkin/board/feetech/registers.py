@@ -1,7 +1,5 @@
 """Registers of the STS3215 (the maker's memory table for SMS and STS servos), low byte first."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 COUNTS_PER_TURN = 4096  # positions a turn

@@ -4,8 +4,6 @@ Source: the project's public interface description (github.com/gnea/grbl, doc/ma
 settings.md and the CSV tables of alarms and errors). grblHAL and FluidNC use the same.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 

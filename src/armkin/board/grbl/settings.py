@@ -1,7 +1,5 @@
 """Compares GRBL's settings with the robot file; serious differences forbid motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Optiboot (Uno) starts the program by itself 1.4 s after the reset. The Mega's st
 byte; once it has received one, only 5 s of silence or its own command end it.
 """
 
-from __future__ import annotations
-
 from armkin.board.ports.logged_port import Traced
 from armkin.board.ports.port import Port
 from armkin.board.ports.serial_port import SerialPort

@@ -1,7 +1,5 @@
 """A port whose bytes are logged by the logger `armkin.board` at DEBUG, and only then."""
 
-from __future__ import annotations
-
 import logging
 
 from armkin.board.ports.port import Port

@@ -1,7 +1,5 @@
 """The interface of every port: bytes in both directions, and a clock."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 BAUD = 250_000  # rate [bit/s] of the firmware's port

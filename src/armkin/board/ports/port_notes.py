@@ -1,7 +1,5 @@
 """Small files beside a port's lock that outlive the process: a motion in progress, the state of a board."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

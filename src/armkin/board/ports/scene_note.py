@@ -1,7 +1,5 @@
 """A note, beside a port's lock, of the scene that was last used with it, so that no motion omits its keep-outs."""
 
-from __future__ import annotations
-
 import os
 from contextlib import suppress
 

@@ -3,8 +3,6 @@
 A port is held exclusively, so that no two programs talk to one arm (port_lock.py).
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -1,7 +1,5 @@
 """A Unix socket as a port, for Klipper's API server on this computer."""
 
-from __future__ import annotations
-
 import os
 import select
 import socket

@@ -1,7 +1,5 @@
 """Counts of the simulated board's axes, and the rule for their limits."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Image, RowImage

@@ -1,7 +1,5 @@
 """Simulated time, which passes while a host waits for an answer."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 
 

@@ -1,7 +1,5 @@
 """The simulated board's handling of frames: checks, then actions of setup or motors."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 

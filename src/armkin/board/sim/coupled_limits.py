@@ -1,7 +1,5 @@
 """Limits of coupled joints and limit switches, as the simulated board checks them (firmware/PROTOCOL.md, 4 and 9)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from armkin.board.firmware.wire.protocol import Error, GuardImage, Image

@@ -1,7 +1,5 @@
 """Motion along a vector of rates, scaled by a share between 0 and 1, for homing and jogging."""
 
-from __future__ import annotations
-
 from armkin.board.sim.axis_counts import Axes, limit_rule_holds, row_value
 
 _TICK_TIME = 0.001  # length [s] of a tick

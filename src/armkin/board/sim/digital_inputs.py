@@ -1,7 +1,5 @@
 """The simulated board's inputs: limit switches, the abort input, the motors' supply."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from armkin.board.sim.coupled_limits import leads_to_switch

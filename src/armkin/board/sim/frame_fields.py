@@ -1,7 +1,5 @@
 """Reads motion frames and configuration images for the simulated board, and checks every field."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -4,8 +4,6 @@ Source: GRBL's own `protocol.c`, `gcode.c` and `report.c` (1.1h) and grblHAL's, 
 which go together, what a reset clears and what outlives it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field

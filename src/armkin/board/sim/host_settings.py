@@ -1,7 +1,5 @@
 """The simulated board's setup by the host: its configuration, drivers and servo pulses."""
 
-from __future__ import annotations
-
 import zlib
 
 from armkin.board.firmware.wire.protocol import AxisImage, Error, Image

@@ -1,7 +1,5 @@
 """The simulated board's checks of a MOTION frame before it queues any segment (firmware/PROTOCOL.md, 6)."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment

@@ -1,7 +1,5 @@
 """The simulated board's queue of segments, run in simulated time; its counts are exact to the tick."""
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Iterator

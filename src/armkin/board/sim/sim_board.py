@@ -4,8 +4,6 @@ It is written from firmware/PROTOCOL.md and held to the same golden conversation
 simulated: it passes in `advance`, so that a long move takes no longer than its arithmetic.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

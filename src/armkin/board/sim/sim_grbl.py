@@ -7,8 +7,6 @@ homing. Its blocks start and end at rest; GRBL itself looks ahead. `hal`: as grb
 for whole-number settings, keeps G92 over a soft reset, and over a loss of power unless $384 is 1.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections import deque

@@ -1,7 +1,5 @@
 """The simulated board's homing: HOME of firmware/PROTOCOL.md, section 8, in simulated time."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The simulated board's jogging: the arm moves while the host repeats its vector of rates."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from armkin.board.sim.cruise import Cruise

@@ -5,8 +5,6 @@ It keeps what armkin relies on: requests and answers (API_Server.md), MANUAL_STE
 ramps; LIMIT_VELOCITY slows them down, and a jump of speed beyond INSTANTANEOUS_CORNER_VELOCITY is counted.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -3,8 +3,6 @@
 What the firmware does every millisecond happens every millisecond here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from armkin.board.firmware.wire.protocol import HALF, STEP, Error, Segment, State

@@ -1,7 +1,5 @@
 """A bus of simulated STS3215 servos that speak the bus's bytes, in simulated time."""
 
-from __future__ import annotations
-
 import random
 from collections.abc import Iterable
 from typing import NamedTuple

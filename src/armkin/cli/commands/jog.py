@@ -1,7 +1,5 @@
 """`armkin jog`."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -1,7 +1,5 @@
 """`armkin ports`."""
 
-from __future__ import annotations
-
 from armkin.cli import output, render
 from armkin.cli.options import Json
 

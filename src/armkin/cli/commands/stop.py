@@ -1,7 +1,5 @@
 """`armkin stop`."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

@@ -1,7 +1,5 @@
 """`armkin teach`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import Annotated

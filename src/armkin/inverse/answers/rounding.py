@@ -4,8 +4,6 @@ A pose that was printed in six digits or kept in float32 differs from the arm's 
 exact answer to the rounded pose is far from the arm's posture: docs/solution.md, "Rounded targets".
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ once for each arm which sign has which name:
 The branches of general arms have no such words and are numbered.
 """
 
-from __future__ import annotations
-
 import itertools
 from functools import lru_cache
 from typing import cast

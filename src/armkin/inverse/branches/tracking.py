@@ -5,8 +5,6 @@ returns branches in the arbitrary order of its eigenvalues. Between neighbouring
 branch is the one that moves least, provided that the targets are close enough to be certain.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int, wrap_angle

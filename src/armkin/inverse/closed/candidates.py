@@ -1,7 +1,5 @@
 """Candidates of a closed form with their residuals, from code recorded once."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cached_property, lru_cache

@@ -5,8 +5,6 @@ value. For square Jacobians the product of all singular values but the smallest 
 determinant of the Jacobian bordered by its null vectors (Keller, Numerical solution of bifurcation problems, 1977).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool

@@ -5,8 +5,6 @@ joints, which gives the first joint; what remains is a planar two-link arm (Sici
 al., Robotics, 2.12.2 and 2.12.4).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula import arrays, pose

@@ -6,8 +6,6 @@ circuits, and the sine of the angle there keeps its sign on each; else it has on
 Kinematics of Spherical Mechanisms, 1988).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

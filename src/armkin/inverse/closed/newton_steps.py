@@ -5,8 +5,6 @@ under Computer Control, 1968, gives the quartic): if four seeds lead to four roo
 in doubt and need a slower solver.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

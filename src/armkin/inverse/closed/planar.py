@@ -6,8 +6,6 @@ joint at an end of the chain is known from the others: the tip moves back to tha
 two joints remain, which are a `Position` problem with a virtual slide along z for joint 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

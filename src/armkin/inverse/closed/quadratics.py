@@ -3,8 +3,6 @@
 In this order: of 1, b1, b2, b1^2, b1 b2, b2^2; of an affine expression the first three.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula import arrays

@@ -5,8 +5,6 @@ the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An ar
 three axes meet is solved as the reversed chain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 

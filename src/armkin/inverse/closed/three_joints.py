@@ -13,8 +13,6 @@ Revolute joint 2: two equations ``A (gx, gy) = r(q3)`` with a constant A.
 Prismatic joint 2: the same with ``g = y + d2 z``, linear in d2.
 """
 
-from __future__ import annotations
-
 from itertools import accumulate, product
 from typing import cast
 

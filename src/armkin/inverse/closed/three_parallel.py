@@ -7,8 +7,6 @@ Analytic Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, here
 convention). The reversed chain covers axes 3, 4 and 5.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

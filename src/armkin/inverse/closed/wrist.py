@@ -1,7 +1,5 @@
 """Wrists: three axes that meet in a point and turn the tool (Siciliano et al., Robotics, 2.12.5)."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula import arrays, pose

@@ -6,8 +6,6 @@ tan f times the first three, so that the mixtures' last entries are a matrix tim
 mix the solutions back and whose eigenvalues are tan f: the rotational invariance of ESPRIT (Roy & Kailath 1989).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int

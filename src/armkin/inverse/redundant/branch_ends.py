@@ -1,7 +1,5 @@
 """Where branches that are followed along the redundant joint end: two merge, or a limit is crossed."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

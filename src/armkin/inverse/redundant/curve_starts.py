@@ -10,8 +10,6 @@ or swings about where the axes on its sides are parallel or at right angles: one
 every such curve, if it is no smaller still.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

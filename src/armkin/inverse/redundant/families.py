@@ -7,8 +7,6 @@ arm angle (`arm_angle`), or followed along the joint (`followed_branches`). Wher
 axis, which alone is asked for, each branch of the others is one.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

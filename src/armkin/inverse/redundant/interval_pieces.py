@@ -1,7 +1,5 @@
 """Pieces of curves of answers: legal intervals of the redundant joint, and families that have none."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

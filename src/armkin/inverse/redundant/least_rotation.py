@@ -5,8 +5,6 @@ space of the position's Jacobian, with the exact second derivatives of the chain
 and Wright, Numerical Optimization, 2006, 16.5 and 18.1), from many postures at once.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -4,8 +4,6 @@ Over the postures within limits whose tool stands at the target's position, a fa
 are the local minima of the rotation angle: `least_rotation` descends to them from many postures at once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache

@@ -6,8 +6,6 @@ any other is halved. What is above the degree in the samples is rounding, and te
 is left is within it the polynomial is undecided, as two roots may be one or none.
 """
 
-from __future__ import annotations
-
 import math
 from functools import lru_cache
 from typing import NamedTuple

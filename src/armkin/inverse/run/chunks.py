@@ -1,7 +1,5 @@
 """Solves batches by closed forms, in chunks of poses that fit the cache."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import lru_cache

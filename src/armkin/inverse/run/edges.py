@@ -1,7 +1,5 @@
 """Targets with a nearly singular candidate: prepares their seeds for `singular.components`, and writes its answers."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ that direction. Where the cubic is conclusive, it agrees with `singular.local_st
 `singular.components`.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

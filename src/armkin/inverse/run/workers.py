@@ -1,7 +1,5 @@
 """Threads that share a batch, which is possible since numpy and C release Python's lock and targets are independent."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from numbers import Integral
 from typing import TypeVar

@@ -4,8 +4,6 @@ A component on which the residual grows has two ends, where that passes `SOLUTIO
 it, and nothing else is.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -6,8 +6,6 @@ component of the solution set are one branch. Regular postures with none close b
 ones `local_structure` tells the component.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple

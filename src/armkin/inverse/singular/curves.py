@@ -4,8 +4,6 @@ A step along the direction that is lost, pulled back at right angles to it (Allg
 Methods, 1990, ch. 2). Its length is bounded by the second smallest singular value: a curve bends where another is near.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,8 +5,6 @@ one branch if a posture between them solves the target as well: the one half way
 beside it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int

@@ -5,8 +5,6 @@ double root at a limit is off it by as much as arithmetic can tell its halves ap
 followed both ways from the posture that is listed, by `curves`, and filled in to 0.1 degrees.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int

@@ -6,8 +6,6 @@ bars move as `closed.four_bars` says. One posture of each goes to `singular.comp
 have; what is closer, or loses more than one direction, goes there as it is.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -7,8 +7,6 @@ way along v, and a curve x(t). The component of the solution set is the interval
 (docs/solution.md).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

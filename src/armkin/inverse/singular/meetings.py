@@ -5,8 +5,6 @@ of the self-motions and on none. A long step away on each of them one direction 
 rounding.
 """
 
-from __future__ import annotations
-
 from functools import cache
 from itertools import combinations_with_replacement
 

@@ -4,8 +4,6 @@ The exact answer to a rounded target may be 1e-9 over the smallest singular valu
 was made from. Both solve it: the arm that stands there stays.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.array_tuples import stack_rows

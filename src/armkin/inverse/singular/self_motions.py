@@ -4,8 +4,6 @@ A posture is pushed along each direction that its Jacobian loses, and pulled bac
 a self-motion that is listed already is dropped: `armkin.inverse.singular.components` lists one posture of each.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 

@@ -5,8 +5,6 @@ common motion keeps the target wherever the others are. So a surface of postures
 second of the two held it is that curve, and each curve of the arm of the others is a surface of its own.
 """
 
-from __future__ import annotations
-
 import itertools
 
 import numpy as np

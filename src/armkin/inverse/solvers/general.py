@@ -7,8 +7,6 @@ closed form. Others get theirs at the tool, in general position. Completeness: s
 its own Jacobian has full rank, because the virtual axes are in general position.
 """
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np

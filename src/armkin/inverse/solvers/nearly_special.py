@@ -12,8 +12,6 @@ elimination is healthy on the arm, as the share of poses that its first two pass
 six joints go straight to it, and the similar arm only names the branches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

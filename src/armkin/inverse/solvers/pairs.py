@@ -10,8 +10,6 @@ the sum of their residuals and half the difference over ``sqrt(w)`` are smooth i
 regular where that of one root alone is singular: at a fold.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

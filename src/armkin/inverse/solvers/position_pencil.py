@@ -12,8 +12,6 @@ The Quadratic Eigenvalue Problem, 2001), linearised four eigenvalues. Rounding m
 one joint alone, and with them the roots by 1e-16 / S1: nothing is lost, unless two roots all but meet.
 """
 
-from __future__ import annotations
-
 from itertools import permutations
 from typing import Any, NamedTuple
 

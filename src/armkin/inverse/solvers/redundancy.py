@@ -1,8 +1,6 @@
 """Arms with one joint more than their task asks for: which joint is redundant, what its motion does to a target; joints
 that are held."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace

@@ -4,8 +4,6 @@ A sixth, virtual joint about the tool's z axis makes it a full pose whose turn a
 anything: any orientation with the wanted axis will do, and the virtual joint is dropped.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

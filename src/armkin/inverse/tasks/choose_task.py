@@ -1,7 +1,5 @@
 """Chooses the task of an arm: the requested one, that of the robot file, or the one that its structure suggests."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals of targets and their Jacobians: the equations of every Newton step."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array, wrap_angle

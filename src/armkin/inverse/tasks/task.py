@@ -9,8 +9,6 @@ Every task is a choice of three kinds of constraints:
 `residuals` computes the error of a pose from its target, `choose_task` the task of an arm.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any, Literal

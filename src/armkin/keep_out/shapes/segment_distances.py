@@ -1,7 +1,5 @@
 """Distances between segments."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from armkin.formula.arrays import Array

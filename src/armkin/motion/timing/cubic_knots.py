@@ -1,7 +1,5 @@
 """A path through joint space as cubics between grid points."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """A curved path through joint space with its time law."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

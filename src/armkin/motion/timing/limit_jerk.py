@@ -3,8 +3,6 @@
 Joint moves are limited in jerk by the seven phases of `profile.py` instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

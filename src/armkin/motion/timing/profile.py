@@ -4,8 +4,6 @@ A profile is a list of phases of constant jerk, each with position, speed and ac
 evaluated exactly at any time.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The acceleration constraints of every interval of a path, and the two passes that give the fastest time law."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import NamedTuple
 

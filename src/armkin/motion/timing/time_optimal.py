@@ -13,8 +13,6 @@ Every interval has rows for both of its ends (Pham's "interpolation" scheme), so
 points keeps to the limits, too. Arrays have the shape (rows, intervals), since numpy is fast along a long last axis.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

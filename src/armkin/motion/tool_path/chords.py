@@ -1,7 +1,5 @@
 """The chords between consecutive points: lengths, turns and sagittas."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

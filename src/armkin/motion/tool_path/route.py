@@ -1,7 +1,5 @@
 """A route: consecutive pieces of a tool path, with blends or rests at their corners."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -8,8 +8,6 @@ between ticks is a parabola in the number of ticks, which approximates 1 / (v + 
 speed of 13 % over a segment, the acceleration is right to 2 %.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace

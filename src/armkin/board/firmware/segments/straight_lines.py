@@ -4,8 +4,6 @@ The pieces are so few that the board's queue always holds the time to a stop, an
 60 us or 2 % of its period.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Finds the connected boards that answer, for commands without a port name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 from armkin.board.firmware.wire.session import Session

@@ -3,8 +3,6 @@
 payload  --encode_frame-->  COBS(payload + CRC-32) 00  --Splitter-->  payload
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

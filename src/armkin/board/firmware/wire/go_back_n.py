@@ -4,8 +4,6 @@ Submitted frames are sent in order, kept until they are acknowledged, and sent a
 a frame at most once, no matter how often it is sent.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass

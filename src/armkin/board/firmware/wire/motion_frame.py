@@ -1,7 +1,5 @@
 """A MOTION frame: segments of some axes from counts to counts, and their bytes."""
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass

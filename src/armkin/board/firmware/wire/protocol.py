@@ -5,8 +5,6 @@
 Host and simulated board share this module; it knows no port and no motion.
 """
 
-from __future__ import annotations
-
 import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Checks that every field of a board's replies is in its range; an error ends the session."""
 
-from __future__ import annotations
-
 from armkin.board.firmware.wire.protocol import VERSION, Ack, Error, Info, State, Status
 from armkin.errors import LinkError
 

@@ -1,7 +1,5 @@
 """The serial line between host and board: counts damage, measures answer times, and tracks unsent bytes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from armkin.board.firmware.wire import protocol

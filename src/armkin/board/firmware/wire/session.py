@@ -1,7 +1,5 @@
 """A session with a board: opening, frames in sequence, status and hold (firmware/PROTOCOL.md, section 3)."""
 
-from __future__ import annotations
-
 import secrets
 from collections.abc import Callable, Iterator
 
