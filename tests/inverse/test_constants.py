@@ -26,11 +26,19 @@ TEXT = Path(tolerances.__file__).read_text()
 ROOMS = ("singular", "answers", "run")
 # What the rooms of edges compare or divide by besides: starts and stops of iterations, gates before them
 STEPS = {
-    *("NEARBY", "SEED", "HOPELESS", "ARRIVED", "STALLED", "SMOOTH", "FIRST_POINT"),  # of Newton's method, polynomials
-    *("ACROSS", "OFF_CURVE", "CROSSING", "SHORTEST_STEP"),  # of the walker
-    *("FOLD_WAY", "BENT", "APART_ROOTS"),  # gates: what they let pass is decided otherwise
+    *(
+        "NEARBY",
+        "SEED_RESIDUAL",
+        "HOPELESS",
+        "ARRIVED_STEP",
+        "STALLED_RESIDUAL",
+        "SMOOTH_ERROR",
+        "FIRST_POINT",
+    ),  # of Newton's method, polynomials
+    *("STEP_VALUE_SQUARED", "OFF_CURVE_RESIDUAL", "CROSSING_VALUE", "SHORTEST_STEP"),  # of the walker
+    *("FOLD_WAY", "FOLD_BEND", "APART_ROOTS"),  # gates: what they let pass is decided otherwise
     *("TINY", "NO_SIZE", "FAR_DISTANCE"),
-    *("EQUAL", "DECIMAL", "FLOAT32", "FEW_DIGITS"),  # of printed numbers
+    *("EQUAL_DECIMALS", "DECIMAL", "FLOAT32", "FEW_DIGITS"),  # of printed numbers
 }
 OFFSETS = np.array([0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 
@@ -110,7 +118,7 @@ def test_no_word_hangs_on_the_others(monkeypatch: pytest.MonkeyPatch, sample: Ca
     sets = typed_questions()
     before = answer_words(sets)
     assert {0, 1, 2} <= set(before[:, 0])
-    fixed = {"SOLUTION", "REACH", "EQUAL", "DECIMAL", "FLOAT32", "FEW_DIGITS", "TINY", "FAR_DISTANCE"}
+    fixed = {"SOLUTION", "REACH", "EQUAL_DECIMALS", "DECIMAL", "FLOAT32", "FEW_DIGITS", "TINY", "FAR_DISTANCE"}
     rooms = [module for module in deciding_modules() if used_by(module)]
     names = {*ALL, *STEPS} - fixed
     for seed in range(sample(4, 1)):

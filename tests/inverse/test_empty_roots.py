@@ -14,7 +14,7 @@ from oracle import goal_of_joints
 import armkin
 from armkin.inverse.elimination import method, passes, polish, roots
 from armkin.inverse.numeric import tolerances
-from armkin.inverse.numeric.tolerances import ALONE
+from armkin.inverse.numeric.tolerances import LONE_DISTANCE
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.rotation import inverse
 
@@ -55,7 +55,7 @@ def test_no_root_of_a_branch_is_called_empty(name: int | str, monkeypatch: pytes
         unit = closed.length if arm.prismatic[joint] else 1.0
         away = np.abs(branches[seed.pose, :, joint] / unit - seed.q[:, None, joint])
         away = np.where(np.isnan(away), np.inf, away if arm.prismatic[joint] else np.abs(np.angle(np.exp(1j * away))))
-        stands = (seed.tilt == 0) & (seed.gap > ALONE) & (away.min(axis=1) < 1e-6)
+        stands = (seed.tilt == 0) & (seed.gap > LONE_DISTANCE) & (away.min(axis=1) < 1e-6)
         count += int(stands.sum())
         assert seed.defect[stands].max() < 1e-6
     assert count > 300

@@ -17,7 +17,7 @@ from armkin.formula.arrays import numbers_within
 from armkin.inverse import choose_branch
 from armkin.inverse.answers.solutions import Solutions, Status
 from armkin.inverse.branches.names import find_branches
-from armkin.inverse.numeric.tolerances import EQUAL
+from armkin.inverse.numeric.tolerances import EQUAL_DECIMALS
 from armkin.inverse.tasks.residuals import residual
 from armkin.model import limits, units
 from armkin.model.lock_joints import unlock
@@ -92,7 +92,7 @@ def _list_branches(
     allowed = free if request.branch is None else free & np.isin(s.branch[block], answers.names)
     if all_branches:
         unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
-        key = np.where(valid, motion.round(EQUAL), np.inf)
+        key = np.where(valid, motion.round(EQUAL_DECIMALS), np.inf)
         count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
@@ -113,12 +113,13 @@ def _list_branches(
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
     """The branch (N,) of q (N, B, n) that moves the joints least of those wanted (N, B), -1 if none is; and how far.
 
-    Motions are sums of |change| from near (n,), each joint by its scale (n,); to `EQUAL` decimals the first one counts.
+    Motions are sums of |change| from near (n,), each joint by its scale (n,). Of those that are equal to
+    `EQUAL_DECIMALS` decimals the first one counts.
     """
     has_branch, motion = _any_column(candidates), _joint_motion(q, near, scale)
     if not q.shape[1]:
         return np.full(len(q), -1), np.full(len(q), np.nan)
-    branch = np.where(candidates, motion.round(EQUAL), np.inf).argmin(axis=1)
+    branch = np.where(candidates, motion.round(EQUAL_DECIMALS), np.inf).argmin(axis=1)
     return np.where(has_branch, branch, -1), motion[np.arange(len(q)), branch]
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from armkin.compiled import toolchain
 from armkin.formula.arrays import Array, Bool
-from armkin.inverse.numeric.tolerances import EQUAL
+from armkin.inverse.numeric.tolerances import EQUAL_DECIMALS
 
 SOURCE = Path(__file__).parent / "parts" / "least_motion.c"
 MAX_JOINTS = 7  # most joints that numpy sums from left to right
@@ -25,7 +25,7 @@ def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> t
     branch, motion, differences = np.empty(N, np.int64), np.full(N, np.nan), np.empty(B * n)
     inputs = np.ascontiguousarray(q), np.ascontiguousarray(candidates), np.tile(near, B), np.tile(scale, B), differences
     pointers = (array.ctypes.data for array in inputs)
-    _library()(N, B, n, *pointers, 10.0**EQUAL, branch.ctypes.data, motion.ctypes.data)
+    _library()(N, B, n, *pointers, 10.0**EQUAL_DECIMALS, branch.ctypes.data, motion.ctypes.data)
     return branch, motion
 
 

@@ -199,7 +199,7 @@ def turns(request: Request, branch: Branch) -> list[list[float]]:
     arm = request.arm
     copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
-    keeps_held = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD
+    keeps_held = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD_DIFFERENCE
     return [list(row) for row in units.joints_out(arm, copies[keeps_held]).tolist()]
 
 
@@ -349,8 +349,8 @@ class _SweptTarget:
 
 def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
     hit = branch.within_limits and bool(branch.hits)  # hits outside limits do not count
-    angle = round(branch.residual_deg, tol.EQUAL) if request.position_first else 0.0
-    return not branch.within_limits, hit, angle, round(branch.motion, tol.EQUAL)
+    angle = round(branch.residual_deg, tol.EQUAL_DECIMALS) if request.position_first else 0.0
+    return not branch.within_limits, hit, angle, round(branch.motion, tol.EQUAL_DECIMALS)
 
 
 def _refusal_reasons(request: Request, named: Sequence[Branch]) -> str:

@@ -182,7 +182,7 @@ static void arm_pass_lanes(const arm_pencil *pencil, arm_state **pose, int count
             continue;
         }
         for (i = j = from; i < begin[t + 1]; i++) {
-            if (of.most[t] < ARM_STEADY && done[i].guess > ARM_STRAY
+            if (of.most[t] < ARM_STEADY && done[i].guess > ARM_STRAY_DISTANCE
                 && arm_may_be_empty(&seed[i].seed, solved[t].re, solved[t].im, pencil->size))
                 continue;
             kept[j - from] = seed[i].seed;

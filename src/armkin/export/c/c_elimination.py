@@ -38,8 +38,9 @@ _METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_root
 _NAMED = {  # numbers of the method, by their names in Python
     name: getattr(tolerances, name)
     for name in (
-        "ALONE", "BLURRED_ROOT", "CLOSE_RESIDUAL", "DOUBLE", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED", "GRAZING", "ILL",
-        "INFINITE", "NO_PRODUCT", "OWN_ROOT", "PAIRED", "SAME_KEY", "SAME_ROOT", "STRAY", "TWIN_ROOTS", "UPRIGHT",
+        "BLURRED_ROOT", "CLOSE_RESIDUAL", "DOUBLE_VALUE", "ELIMINATED", "EQUAL_ROOTS", "EXAMINED_DISTANCE", "GRAZING",
+        "ILL_INVERSE", "INFINITE_SLIDE", "LONE_DISTANCE", "NO_PRODUCT", "OWN_ROOT", "PAIRED_PART", "SAME_KEY",
+        "SAME_ROOT", "STRAY_DISTANCE", "TWIN_ROOTS", "UPRIGHT",
     )
 }  # fmt: skip
 BRANCHES = MAX_ANSWERS

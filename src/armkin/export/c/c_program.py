@@ -14,7 +14,7 @@ from armkin.export.c.source_parts import part_text
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.branches.names import branch_names
-from armkin.inverse.numeric.tolerances import CLOSE_BY, DECIMAL, FLOAT32
+from armkin.inverse.numeric.tolerances import CLOSE_DISTANCE, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import held_by_near, redundancy
@@ -188,7 +188,7 @@ def has_form(geometry: Geometry) -> bool:
 
 def settings(single: bool = False) -> str:
     """The constants of the fixed parts."""
-    values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_BY}  # answers this close may be equal
+    values = {**(_SINGLE if single else _DOUBLE), "CLOSE_BY": CLOSE_DISTANCE}  # answers this close may be equal
     values |= {"ROUNDED": ROUNDED, "DECIMAL": DECIMAL, "FLOAT": FLOAT32}
     lines = [f"#define ARM_{name} {number_text(value, single)}" for name, value in values.items()]
     return "\n".join([*lines, ""])

@@ -199,7 +199,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         free_pairs = free[:, :, None] & free[:, None, :]
         values, vectors = np.linalg.eigh(np.where(free_pairs, H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        is_minimum = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL)
+        is_minimum = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL_CURVATURE)
         converged[active] = is_minimum
         active, rows_left = active[~is_minimum], np.flatnonzero(~is_minimum)
         if not len(active):
@@ -210,7 +210,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         step = np.einsum("mij,mj->mi", vectors, components / np.maximum(np.abs(values), tol.LEVEL_VALUE))
         step *= np.minimum(1.0, 0.3 / np.maximum(np.abs(step).max(axis=1), tol.TINY))[:, None]
         pending = np.arange(len(active))
-        for shrink in (1.0, 0.25, 0.05, tol.SHORTENED):
+        for shrink in (1.0, 0.25, 0.05, tol.SHORTENED_SHARE):
             rows = active[pending]
             trial = np.clip(q[rows] + shrink * step[pending] * unit, arm.lower, arm.upper)
             new_cost = _cost(arm, task, trial, target[rows])

@@ -150,4 +150,4 @@ class Solutions:
 def _rounded_motion(motion: Array) -> Array:
     """How much more than the least (..., B) of each target, inf where there is none: equal if rounding explains it."""
     least = motion.min(axis=-1, initial=np.inf, keepdims=True)
-    return (motion - np.where(np.isfinite(least), least, 0.0)).round(tol.EQUAL)
+    return (motion - np.where(np.isfinite(least), least, 0.0)).round(tol.EQUAL_DECIMALS)

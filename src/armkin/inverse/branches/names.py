@@ -61,7 +61,7 @@ def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
     distances = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)
-    found_again = distances.min(axis=1) < tol.NAMED  # some branch is the posture itself
+    found_again = distances.min(axis=1) < tol.NAMED_DISTANCE  # some branch is the posture itself
     swap = {label: np.zeros(shape[1:], bool) for label in geometry.labels if label}
     signs = np.stack(np.unravel_index(distances.argmin(axis=1), shape[1:]), axis=1)  # (postures, 3) of that branch
     if "shoulder" in swap and found_again.any():

@@ -196,4 +196,4 @@ def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     rows = np.array(list(itertools.product(*choices))).reshape(-1, arm.n)
     unit = np.where(arm.prismatic, 1.0, 180.0 / np.pi)
     motion = (np.abs(rows - reference) * unit).sum(axis=1)
-    return rows[np.argsort(motion.round(tol.EQUAL), kind="stable")]
+    return rows[np.argsort(motion.round(tol.EQUAL_DECIMALS), kind="stable")]

@@ -112,7 +112,7 @@ class _EndJoints:
         v = pose.turn_back(self.La, v)
         second, _ = sub.rotation_between(u[0], u[1], v[0], v[1], 1.0, None)
         across = arrays.dot(u[:2], u[:2]) + arrays.dot(v[:2], v[:2])
-        free = (across < tol.LOOSE) | (doubt.edge & (across < tol.LOOSE_DOUBLE))
+        free = (across < tol.LOOSE_LEVER) | (doubt.edge & (across < tol.LOOSE_DOUBLE_LEVER))
         return [first, sub.with_preferred(second, free, prefer[1]), last], doubt | Doubt(free, free)
 
     def _quartic(self, sides: list[list[Entry]], e: list[Entry], prefer: Prefer) -> tuple[Pair, Pair, Doubt]:

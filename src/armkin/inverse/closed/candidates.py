@@ -127,10 +127,10 @@ class Recorded:
         # others do not depend on the free joint and are known already
         chosen = np.where(linkage[:, None, None], chosen & of_linkage[:, None], miss < tol.HOPELESS**2)
         more = [_each_once(np.where((chosen & lost[:, None, None])[..., None], q, np.nan))]
-        solving = np.where((miss < tol.SEED**2)[..., None], q, np.nan)
+        solving = np.where((miss < tol.SEED_RESIDUAL**2)[..., None], q, np.nan)
         meeting = crossings.postures_beside(self.arm, self.task, solving, target)
         apart = np.abs(newton.difference(self.arm, meeting[:, :, None], held[:, None]))  # (N, M, B, n)
-        same = np.where(np.isnan(apart), 0.0, apart).max(axis=3) < tol.TURNED
+        same = np.where(np.isnan(apart), 0.0, apart).max(axis=3) < tol.STILL_TURN
         # these lie on a self-motion whose circuits are all known
         meeting[np.any(same & of_linkage[:, None], axis=2)] = np.nan
         more.append(meeting)
@@ -179,7 +179,7 @@ class Recorded:
         offsets = np.concatenate([rng.uniform(-1, 1, (FREED, n)) * unit, np.zeros((SHAKEN, n))])
         goals = np.repeat(target[:, None], len(offsets), axis=1)
         for k in range(FREED, len(offsets)):
-            goals[:, k] = shifted_targets(self.arm, self.task, target, tol.SHAKE * rng.uniform(-1, 1, 6))
+            goals[:, k] = shifted_targets(self.arm, self.task, target, tol.SHAKE_DISTANCE * rng.uniform(-1, 1, 6))
         q, miss = self._at_values(goals, near[:, None] + offsets)
         return _each_once(np.where((miss < tol.HOPELESS**2)[..., None], q, np.nan))
 

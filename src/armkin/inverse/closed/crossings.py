@@ -46,7 +46,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
         meets |= changes
         second[changes] *= tol.SIGN_FACTOR  # prefer the crossing between two steps to the steps
     for b in range(1, B):  # double roots occur twice
-        twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.SAME
+        twin = np.abs(newton.difference(arm, q[:, :, :b], q[:, :, b, None])).max(axis=3) < tol.ROUNDING_DISTANCE
         meets[:, :, b] &= ~twin.any(axis=2)
     spot = _distinct_places(arm, place.reshape(N, -1, n), np.where(meets, second, np.inf).reshape(N, -1)).reshape(-1, n)
     postures = np.full((len(spot), 8, n), np.nan)
@@ -59,7 +59,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     landed, size = newton.correct(arm, task, start, goal, steps=10)
     # A posture that is corrected to where it began lies on both self-motions, nearly, and tells of neither.
     back = np.abs(newton.difference(arm, landed, np.repeat(spot[rows], 8, axis=0))).max(axis=1) < 0.5 * OTHER_SIDE
-    postures[rows] = np.where((back | (size > tol.SEED))[:, None], np.nan, landed).reshape(-1, 8, n)
+    postures[rows] = np.where((back | (size > tol.SEED_RESIDUAL))[:, None], np.nan, landed).reshape(-1, 8, n)
     return postures.reshape(N, -1, n)
 
 

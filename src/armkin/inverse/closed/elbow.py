@@ -180,7 +180,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     parallels = 2 if task.name in ("xyz", "xyz_roll") else 3
     if not all(is_parallel(L, tolerance) for L in arm.link[2 : parallels + 1]):
         return None
-    if arm.prismatic[0] and abs(arm.link[1][2, 2]) < tol.PARALLEL:
+    if arm.prismatic[0] and abs(arm.link[1][2, 2]) < tol.PARALLEL_SINE:
         return None  # the slide moves within the arm's plane
     why = "joints 2 and 3 are parallel" if parallels == 2 else "joints 2, 3 and 4 are parallel"
     labels = ("" if arm.prismatic[0] else "shoulder", "elbow", "")

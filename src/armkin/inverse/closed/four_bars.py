@@ -74,7 +74,7 @@ def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     N, _, B, n = q.shape
     present = ~np.isnan(q[..., 0])
     first = np.take_along_axis(q, present.argmax(axis=1)[:, None, :, None], axis=1)
-    joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > tol.SAME).any(axis=1))
+    joints: Bool = np.asarray((np.abs(newton.difference(arm, q, first)) > tol.ROUNDING_DISTANCE).any(axis=1))
     k, b = np.nonzero(joints.sum(axis=2) == 4)
     is_linkage, joint = dead_points(arm, first[k, 0, b], joints[k, b])
     k, b, joint = k[is_linkage], b[is_linkage], joint[is_linkage]
@@ -118,7 +118,7 @@ def _linkages(arm: Arm, q: Array, four: Int) -> _Linkages:
     along = (turn * normal[:, 0]).sum(axis=1, keepdims=True) / far
     centre = point[:, :1] + (along * axis[:, 0])[:, None]
     miss = np.linalg.norm(cross_rows(centre - point, axis), axis=2)
-    spherical = ~planar & (area > tol.PARALLEL).all(axis=1) & (miss < tol.NO_AREA).all(axis=1)
+    spherical = ~planar & (area > tol.PARALLEL_SINE).all(axis=1) & (miss < tol.NO_AREA).all(axis=1)
     arcs = np.arctan2(area, (axis * after).sum(axis=2))
     triple = (np.roll(axis, 1, axis=1) * normal).sum(axis=2)
     meeting = spherical[:, None]

@@ -39,7 +39,14 @@ class Precision(NamedTuple):
 
 
 ULPS = 128 * 2.0**-23  # relative rounding of a float: a pose of six joints is off by ten to a hundred units
-IN_DOUBLE = Precision(tol.TANGENT, tol.SHARP, tol.ONE_ROOT, tol.FREE, tol.NEARLY_FREE, tol.NEARBY**2)
+IN_DOUBLE = Precision(
+    tol.TANGENT_DISCRIMINANT,
+    tol.SHARP_DISCRIMINANT,
+    tol.ONE_ROOT,
+    tol.FREE_AMPLITUDE,
+    tol.NEARLY_FREE_AMPLITUDE,
+    tol.NEARBY**2,
+)
 IN_SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)  # thresholds in single precision
 
 _current = ContextVar("precision", default=IN_DOUBLE)
@@ -269,7 +276,7 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
 
     e: [e0, ec, es, ecc, ecs, ess], entries (N,); scale: the size that they have; prefer: the angle to give where
     the equation holds for all. Returns the four roots on branch axes (2, 2, 1, N), and doubt: roots that touch,
-    complex ones that miss the real line by less than `TOUCHING`, or an equation that says nothing: one that
+    complex ones that miss the real line by less than `TOUCHING_DISTANCE`, or an equation that says nothing: one that
     vanishes or, as cos^2 + sin^2 - 1, does so on the circle. Without a real root the pair is
     that of the closest angle, not normalised, as in `linear`.
 
@@ -291,9 +298,11 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     h2 = lx * lx + ly * ly
     disc = h2 - lz * lz
     pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
-    real = disc > -(tol.TOUCHING**2) * h2
+    real = disc > -(tol.TOUCHING_DISTANCE**2) * h2
     root, slope = _on_conic(pair, real, conic)
-    merging = (real & (arrays.absolute(slope) < tol.MERGING)) | ((disc < 0.0) & (-disc < tol.TOUCHING**2 * h2))
+    merging = (real & (arrays.absolute(slope) < tol.MERGING_SLOPE)) | (
+        (disc < 0.0) & (-disc < tol.TOUCHING_DISTANCE**2 * h2)
+    )
     free = conic_size * size < tol.NO_SIZE * scale
     return with_preferred(root, free, prefer), Doubt(merging | triple | free, free)
 

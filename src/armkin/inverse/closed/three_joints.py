@@ -262,7 +262,7 @@ def _is_root(six: list[Entry], third: Pair, length: Entry) -> Truth:
     total, size = terms[0], abs(terms[0])
     for term in terms[1:]:
         total, size = arrays.add(total, term), arrays.add(size, abs(term))
-    solves: Truth = arrays.absolute(total) <= arrays.add(tol.SEED * size, tol.NEARBY * length)
+    solves: Truth = arrays.absolute(total) <= arrays.add(tol.SEED_RESIDUAL * size, tol.NEARBY * length)
     return solves
 
 
@@ -272,7 +272,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
         return None
     if rank(arm, task) < 3:
         raise UsageError(f"{arm.name}: its three joints cannot place a point: they move it in a plane or on a line")
-    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, tol.NEARLY_SPECIAL)
+    position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tolerance, tol.COUNTED_DEFECT)
     if position.close and tolerance == tol.EXACT:
         return None
     kinds = "".join("P" if p else "R" for p in arm.prismatic)

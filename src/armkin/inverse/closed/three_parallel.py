@@ -46,7 +46,7 @@ def has_three_parallel(chain: Chain, tolerance: float, reach: float) -> bool:
     L1, L2, L3, L4, L5 = chain.link[1:6]
     if not (is_parallel(L2, tolerance) and is_parallel(L3, tolerance)):
         return False
-    if any(is_parallel(L, max(tolerance, tol.PARALLEL)) for L in (L1, L4, L5)):
+    if any(is_parallel(L, max(tolerance, tol.PARALLEL_SINE)) for L in (L1, L4, L5)):
         return False
     return float(np.hypot(*_meeting_of_axes(L5)[1])) <= tolerance * reach
 

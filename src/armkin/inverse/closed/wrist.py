@@ -29,7 +29,7 @@ def perpendicular_foot(L: Array) -> Array:
 
 def meeting_point(L4: Array, L5: Array, tolerance: float) -> tuple[Array, Array] | None:
     """The point where the axes around two links meet, before the first joint and after the last one, or None."""
-    if is_parallel(L4, tol.PARALLEL) or is_parallel(L5, tol.PARALLEL):
+    if is_parallel(L4, tol.PARALLEL_SINE) or is_parallel(L5, tol.PARALLEL_SINE):
         return None
     at4 = perpendicular_foot(L4)
     at5 = (inverse(L4) @ [*at4, 1.0])[:3]

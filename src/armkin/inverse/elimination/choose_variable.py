@@ -97,7 +97,7 @@ def prepare(link: Array, prismatic: Bool) -> Elimination:
     q[:, prismatic] = rng.uniform(-1, 1, (SAMPLES, int(np.sum(prismatic))))
     goal, size = sample_poses(loop, q)
     # Collinear axes, say: no solution is isolated and no role can do better.
-    redundant = bool(np.all(size < tol.RANK))
+    redundant = bool(np.all(size < tol.RANK_VALUE))
     rated: list[_Rating] = []
     # The first slots nearly always do; some arms with two prismatic joints need the others.
     for slot, hidden in _SEARCH:

@@ -61,14 +61,14 @@ def close_loop(link: Array, prismatic: Bool) -> Loop:
         lengths[rows] = link[i + 1, :3, 3]
         moves[rows, columns] = -free[i]
         moves[rows, next_columns] = link[i + 1, :3, :3] @ free[i + 1]
-    d = np.linalg.lstsq(moves, -lengths, rcond=tol.RANK)[0]
+    d = np.linalg.lstsq(moves, -lengths, rcond=tol.RANK_VALUE)[0]
     links = np.array(link, dtype=float)
     for i in range(6):
         move = free[i] @ d[start[i] : start[i + 1]]
         links[i, :3, 3] += links[i, :3, :3] @ move
         links[i + 1, :3, 3] -= move
     size = float(np.linalg.norm(links[1:6, :3, 3], axis=1).sum()) / 3
-    length = size if size > tol.RANK * (1 + float(np.abs(link[:, :3, 3]).max())) else UNIT_LENGTH
+    length = size if size > tol.RANK_VALUE * (1 + float(np.abs(link[:, :3, 3]).max())) else UNIT_LENGTH
     links = shrink_translations(links, length)
     return Loop(np.array(prismatic, dtype=np.bool_), links[0], links[1:6], links[6], length)
 

@@ -64,13 +64,13 @@ def prepare(role: Role, part: Bool, links: Array) -> Ends:
             product = np.einsum("bij,jk,akl->bail", U_b, middle, U_a)
             factors = (np.concatenate([product[b, a] for b, a in _MONOMIALS]),)
         size = np.linalg.svd(_monomials(role.slot, factors, _SAMPLES), compute_uv=False)
-        rank = int(np.sum(size > tol.RANK * size[:, :1], axis=1).max())
+        rank = int(np.sum(size > tol.RANK_VALUE * size[:, :1], axis=1).max())
         return Ends(role.slot, rank, factors, nothing, nothing)
     product = np.einsum("bij,ja->iba", U_b, middle @ axis_features)
     Q = np.stack([product[:, b, a] for b, a in _MONOMIALS], axis=1)
     basis, size, _ = np.linalg.svd(Q)
-    rank = int(np.sum(size > tol.RANK * size[0]))
-    return Ends(role.slot, rank, (), basis[:, rank:].T, np.linalg.pinv(Q, rcond=tol.RANK)[_READ:])
+    rank = int(np.sum(size > tol.RANK_VALUE * size[0]))
+    return Ends(role.slot, rank, (), basis[:, rank:].T, np.linalg.pinv(Q, rcond=tol.RANK_VALUE)[_READ:])
 
 
 def eliminate_ends(ends: Ends, Y: Array) -> tuple[Array, Array]:

@@ -68,7 +68,7 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
     key, answers = key[order], rows_of(answers, order)
     pose, q, residual = answers.pose, answers.q, answers.residual
     keep, merged_poses = np.ones(pose.size, dtype=np.bool_), np.zeros(goal.shape[0], dtype=np.bool_)
-    widest = float(np.abs(_WEIGHTS).sum()) * tol.EXAMINED
+    widest = float(np.abs(_WEIGHTS).sum()) * tol.EXAMINED_DISTANCE
     for gap in range(1, pose.size):
         first = np.flatnonzero((pose[gap:] == pose[:-gap]) & (key[gap:] - key[:-gap] < widest))
         if first.size == 0:
@@ -76,14 +76,14 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         second = first + gap
         step = difference(prismatic, q[second], q[first])
         distance = np.abs(step).max(axis=1)
-        examined = np.flatnonzero((distance < tol.EXAMINED) & keep[first] & keep[second])
+        examined = np.flatnonzero((distance < tol.EXAMINED_DISTANCE) & keep[first] & keep[second])
         if examined.size == 0:
             continue
         first, second = first[examined], second[examined]
         step, distance = step[examined], distance[examined]
         target = np.ascontiguousarray(goal[pose[first], :3].transpose(1, 2, 0))
         _, middle_error = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
-        blur = np.maximum(tol.HALFWAY, 4 * np.maximum(residual[first], residual[second]))
+        blur = np.maximum(tol.HALFWAY_RESIDUAL, 4 * np.maximum(residual[first], residual[second]))
         # How far off an answer may be itself: its next Newton step, along a curve of answers that all but solve it.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
@@ -102,7 +102,7 @@ def pack_by_pose(answers: Answers, count: int) -> tuple[Array, Bool]:
     """
     number = np.bincount(answers.pose, minlength=count)
     near_singular = number > MAX_ANSWERS
-    near_singular[answers.pose[answers.weakness > tol.ILL]] = True
+    near_singular[answers.pose[answers.weakness > tol.ILL_INVERSE]] = True
     if number.max(initial=0) > MAX_ANSWERS:
         rank = np.empty(answers.pose.size, dtype=np.int64)
         rank[np.lexsort((answers.weakness, answers.pose))] = numbers_within(number)

@@ -32,24 +32,24 @@ def run_pass(loop: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answ
     is_open, touching = seed.badly_scaled, np.zeros(goal.shape[0], dtype=np.bool_)
     # Rounding turns two equal real roots into a complex pair, a shaken goal two close ones: a pair with a tilt below
     # this, whose steps end near the goal, may stand for real solutions, and the pose is left open.
-    pair_tilt = tol.PAIRED + 10 * np.sqrt(shake)
+    pair_tilt = tol.PAIRED_PART + 10 * np.sqrt(shake)
     may_be_pair = seed.tilt < pair_tilt
-    near_answer = polished.residual < tol.STRAY
+    near_answer = polished.residual < tol.STRAY_DISTANCE
     if retry:
-        near_answer = (polished.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair_tilt, tol.STRAY))
+        near_answer = (polished.residual < tol.CLOSE_RESIDUAL) & (seed.tilt < max(pair_tilt, tol.STRAY_DISTANCE))
     failed = ~valid & ((seed.tilt < tol.UPRIGHT) | near_answer | seed.torn)
     touch = valid & (seed.tilt > 0) & (seed.tilt < tol.UPRIGHT)
     doubtful = valid & (seed.tilt > 0) & may_be_pair
     own_root = _own_roots(loop, pencil, target, seed, polished, valid) if shake == 0 else np.zeros(len(valid), bool)
     # A real root that was far from the answer it led to may have stood for another one, if it is not the answer's own.
-    stray = valid & (seed.tilt == 0) & (polished.guess > tol.STRAY + 30 * shake) & ~own_root
+    stray = valid & (seed.tilt == 0) & (polished.guess > tol.STRAY_DISTANCE + 30 * shake) & ~own_root
     is_open[seed.pose[failed | doubtful | stray]] = True
     touching[seed.pose[touch | (polished.residual > tol.ELIMINATED) & (polished.residual < 10 * tol.GRAZING)]] = True
     answers = answers_of(loop, seed.pose, polished, valid)
     # Complex roots with a larger tilt tell nothing here: damped steps bring many to an answer that has its own root.
     is_open[_blurred_pairs(seed, polished, own_root, valid & may_be_pair, tol.BLURRED_ROOT + 10 * shake)] = True
     is_open[_met_twice(loop, rows_of(answers, seed.tilt[valid] == 0))] = True
-    guesses = answers_of(loop, seed.pose, polished, ~valid & (polished.residual < tol.SEED))
+    guesses = answers_of(loop, seed.pose, polished, ~valid & (polished.residual < tol.SEED_RESIDUAL))
     return answers, is_open, touching, guesses
 
 
@@ -64,7 +64,7 @@ def _own_roots(loop: Loop, pencil: Pencil, goal: Array, seed: roots.RootSeeds, p
     change = difference(loop.prismatic, polished.q, seed.q)[:, pencil.hidden_joint]
     own_root = (np.abs(change) < tol.OWN_ROOT) & (weakest < REGULAR)[seed.pose]
     # unless several solutions share the middle joints: these are one root
-    strays = np.flatnonzero(valid & (seed.tilt == 0) & (polished.guess > tol.STRAY) & own_root)
+    strays = np.flatnonzero(valid & (seed.tilt == 0) & (polished.guess > tol.STRAY_DISTANCE) & own_root)
     if strays.size:
         own_root[strays] = roots.end_joints_follow(pencil, inverse(goal[strays]), polished.q[strays])
     return own_root
@@ -90,7 +90,7 @@ def _met_twice(loop: Loop, real: Answers) -> Int:
     same_key = (np.diff(real.pose[order]) == 0) & (np.diff(key[order]) < tol.SAME_KEY)
     pairs = np.flatnonzero(same_key)  # different answers may have the same key: about one pose in 10,000
     step = difference(loop.prismatic, real.q[order[pairs + 1]], real.q[order[pairs]])
-    return np.asarray(real.pose[order[pairs[np.abs(step).max(axis=1, initial=0.0) < tol.EXAMINED]]])
+    return np.asarray(real.pose[order[pairs[np.abs(step).max(axis=1, initial=0.0) < tol.EXAMINED_DISTANCE]]])
 
 
 def _without_empty(loop: Loop, seed: roots.RootSeeds, goal: Array, retry: bool) -> roots.RootSeeds:
@@ -100,14 +100,14 @@ def _without_empty(loop: Loop, seed: roots.RootSeeds, goal: Array, retry: bool) 
     product, and such a root has no other vector. Of a multiple root that was taken apart all products are known.
     One farther off the real line than a double one is stays in later passes alone: steps may lead it to an answer.
     """
-    empty = (seed.defect > tol.NO_PRODUCT) & (seed.gap > tol.ALONE)
+    empty = (seed.defect > tol.NO_PRODUCT) & (seed.gap > tol.LONE_DISTANCE)
     upright = seed.tilt < tol.TWIN_ROOTS
     simple = np.flatnonzero(empty & upright)
     keep = ~empty | retry | upright
     if simple.size:
         target = np.ascontiguousarray(goal[seed.pose[simple], :3].transpose(1, 2, 0))
         frame, _ = tip(loop.chain, loop.prismatic, np.ascontiguousarray(seed.q[simple].T))
-        keep[simple[pose_error(frame, target)[1] > tol.STRAY]] = False
+        keep[simple[pose_error(frame, target)[1] > tol.STRAY_DISTANCE]] = False
     if keep.all():
         return seed
     pose, q, hidden, tilt, badly_scaled, defect, gap = seed

@@ -166,7 +166,7 @@ def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128
     products = coefficients.shape[3]
     _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, -1, products)
     _, size, vectors = np.linalg.svd(M_c + 1j * M_s)  # M(i) but for a factor, whatever psi
-    null = vectors[size < tol.NULL * size[0]].conj().T
+    null = vectors[size < tol.NULL_VALUE * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.
     # The singular values of K^T K are the cosines between K and its conjugate.
     _, cosine, mixing = np.linalg.svd(null.T @ null)

@@ -122,7 +122,7 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         index = active[is_better]
         best_q[:, index], residual[index] = value[:, is_better], size[is_better]
         # While the residual falls steeply the last inverse Jacobian is good for one more step.
-        stale = np.flatnonzero((size > tol.STALE * last) & (size > tol.CONVERGED)) if step else active
+        stale = np.flatnonzero((size > tol.STALE_SHARE * last) & (size > tol.CONVERGED)) if step else active
         last = size
         if stale.size:
             rows = slice(None) if stale.size == active.size else stale

@@ -46,7 +46,7 @@ class RootSeeds(NamedTuple):
     @property
     def torn(self) -> Bool:
         """(M,) What may be a part of a multiple root: rounding tears it apart and off the real line, but not far."""
-        return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.ALONE) & (self.tilt < tol.ALONE)
+        return (self.defect > tol.NO_PRODUCT) & (self.gap < tol.LONE_DISTANCE) & (self.tilt < tol.LONE_DISTANCE)
 
 
 class _PencilRoots(NamedTuple):
@@ -76,7 +76,7 @@ def root_seeds(pencil: Pencil, X: Array, tolerance: float, part: bool = False) -
     if part and not pencil.prismatic[2:5].any():
         candidates = _part_equal_roots(pencil, candidates, vectors)
     middle, defect = _middle_joints(pencil, candidates.x, candidates.u)
-    finite = np.flatnonzero((np.abs(middle) < tol.INFINITE).all(axis=0))
+    finite = np.flatnonzero((np.abs(middle) < tol.INFINITE_SLIDE).all(axis=0))
     if finite.size < len(defect):
         candidates, middle, defect = rows_of(candidates, finite), middle[:, finite], defect[finite]
     pose, index, _, tilt, _, multiple = candidates
@@ -130,7 +130,7 @@ def end_joints_follow(pencil: Pencil, X: Array, q: Array) -> Bool:
     a, b, e = _other_joints(pencil, part[2:5], Y, np.arange(len(q)), recover)
     change = np.stack([a, b, e]) - part[[0, 1, 5]]
     revolute = ~pencil.prismatic[[0, 1, 5]][:, None]
-    return np.asarray((np.abs(np.where(revolute, np.angle(np.exp(1j * change)), change)) < tol.FOLLOWS).all(axis=0))
+    return np.asarray((np.abs(np.where(revolute, np.angle(np.exp(1j * change)), change)) < tol.END_ERROR).all(axis=0))
 
 
 def _part_equal_roots(pencil: Pencil, single: _PencilRoots, vectors: NDArray[np.complex128]) -> _PencilRoots:

@@ -84,6 +84,6 @@ def _with_slides(chain: Array, prismatic: Bool, revolute: Array, goal: Array) ->
     # an explicit pseudoinverse would lose as many digits as the weakest direction has
     U, S, Vt = np.linalg.svd(np.stack(axes, axis=-1))
     components = np.swapaxes(U, -1, -2) @ offset[..., None]
-    moves = np.divide(components, S[..., None], out=np.zeros_like(components), where=S[..., None] > tol.COPLANAR)
+    moves = np.divide(components, S[..., None], out=np.zeros_like(components), where=S[..., None] > tol.COPLANAR_VALUE)
     q[..., prismatic] = (np.swapaxes(Vt, -1, -2) @ moves)[..., 0]
     return q, S[..., -1].min(axis=1)

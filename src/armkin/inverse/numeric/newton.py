@@ -51,7 +51,7 @@ def correct(
     q: Array,
     target: Array,
     steps: int = 6,
-    least: float = tol.LEFT_OUT,
+    least: float = tol.LEFT_OUT_VALUE,
     patience: int = 1000,
     stalled: float = np.inf,
 ) -> tuple[Array, Array]:
@@ -93,20 +93,20 @@ def many_starts(arm: Arm, task: Task, target: Array, selected: Bool) -> Array:
     """What Newton's method leads to from the same random postures for each target that may lack branches.
 
     target: (N, m) or (N, 4, 4); selected: (N,), some. Returns (N, STARTS, n) postures that miss a target by less than
-    `SEED`, nan elsewhere: a search, no proof. Of roots that Newton's method only approaches, the nearest round posture,
-    if that is better.
+    `SEED_RESIDUAL`, nan elsewhere: a search, no proof. Of roots that Newton's method only approaches, the nearest round
+    posture, if that is better.
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
     row, index = np.nonzero(np.repeat(selected[:, None], STARTS, axis=1))
     postures = np.full((len(target), STARTS, arm.n), np.nan)
     q, size = correct(arm, task, start[index], target[row], steps=STEPS, patience=PATIENCE)
-    multiple = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED))
+    multiple = np.flatnonzero((size > tol.CONVERGING) & (size < tol.SEED_RESIDUAL))
     if len(multiple):
         rounded = np.where(arm.prismatic, q[multiple], ROUND * np.rint(q[multiple] / ROUND))
         is_better = misses(arm, task, rounded, target[row[multiple]]) < size[multiple]
         q[multiple[is_better]] = rounded[is_better]
-    postures[row, index] = np.where((size < tol.SEED)[:, None], q, np.nan)
+    postures[row, index] = np.where((size < tol.SEED_RESIDUAL)[:, None], q, np.nan)
     return postures
 
 
@@ -183,9 +183,9 @@ class Linear(NamedTuple):
 
 
 class Lost(NamedTuple):
-    """What candidates (K, M) lose; those below `FOLDED` are weak."""
+    """What candidates (K, M) lose; those below `FOLD_VALUE` are weak."""
 
-    sigma: Array  # (K, M) smallest singular value, from `FOLDED` on a lower bound of it
+    sigma: Array  # (K, M) smallest singular value, from `FOLD_VALUE` on a lower bound of it
     nullity: Int  # (K, M) how many directions are lost, of the weak
     V: Array  # (K, M, n, n) right singular vectors of the weak
     weak: Linear  # what is known of the weak alone
@@ -205,7 +205,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Arra
         # the Frobenius norm of the inverse is no smaller than its largest singular value
         inverse = nudged(np.linalg.inv, J)
         sigma[k, b] = bound = 1.0 / np.sqrt((inverse * inverse).sum(axis=(1, 2)))
-        rows = bound < tol.FOLDED
+        rows = bound < tol.FOLD_VALUE
         k, b = k[rows], b[rows]
         r, J = r[rows], J[rows]
     weak = Linear(r, *np.linalg.svd(J))

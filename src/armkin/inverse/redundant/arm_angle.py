@@ -98,7 +98,7 @@ def _circles(srs: ArmAngle, target: Array) -> _Circles:
     miss = np.abs(d_norm - np.sqrt(np.maximum(offset + 2.0 * swing * cos, 0.0)))
     is_reached = (miss <= tol.SOLUTION * srs.arm.reach) & (d_norm > tol.NO_SIZE * srs.arm.reach)
     angle = np.arccos(cos)
-    angle = np.where(angle < tol.SAME, 0.0, np.where(angle > np.pi - tol.SAME, np.pi, angle))
+    angle = np.where(angle < tol.ROUNDING_DISTANCE, 0.0, np.where(angle > np.pi - tol.ROUNDING_DISTANCE, np.pi, angle))
     single = (angle == 0.0) | (angle == np.pi)  # the two elbows are the same
     row, side = np.nonzero(np.stack([is_reached, is_reached & ~single], axis=1))
     q4 = np.arctan2(b, a) + np.where(side == 0, angle[row], -angle[row])
@@ -110,7 +110,7 @@ def _circles(srs: ArmAngle, target: Array) -> _Circles:
     fore = np.einsum("mjk,eijm->ekim", elbow @ L[4][:3, :3], upper)
     hand = np.einsum("ekim,mil->eklm", fore, hand[row, :3, :3])
     R = np.stack([upper, hand], axis=3)
-    stretched = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP).any(axis=0)
+    stretched = (np.abs(R[0, 2, 2]) + np.hypot(R[1, 2, 2], R[2, 2, 2]) > 1.0 - tol.SHARP_DISCRIMINANT).any(axis=0)
     complete = d_norm > tol.SOLUTION * srs.arm.reach
     complete[row[stretched]] = False
     return _Circles(R, q4, row, side, complete)
@@ -266,7 +266,7 @@ def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     best_sample = best_samples(costs, curve + len(legal_cell) * legal, 2 * first, 2 * length + 1)
     sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)
     step = np.remainder(sign * (np.roll(s.turned, -1, axis=1) - s.turned), TURN)
-    step[step > TURN - tol.SAME * 10] = 0.0  # rounding, backwards
+    step[step > TURN - tol.ROUNDING_DISTANCE * 10] = 0.0  # rounding, backwards
     travel = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
     total = travel[circle, 2 * (first + length)] - travel[circle, 2 * first]
     total[length == K] = np.where(total[length == K] > np.pi, TURN, 0.0)

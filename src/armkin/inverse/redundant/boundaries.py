@@ -75,7 +75,7 @@ def boundaries(arm: Arm) -> Boundaries | None:
         return None
     L = shrink_translations(arm.link, arm.reach)
     shoulder = meeting_point(L[1], L[2], tol.EXACT)
-    if shoulder is None or is_parallel(L[5], tol.PARALLEL):
+    if shoulder is None or is_parallel(L[5], tol.PARALLEL_SINE):
         return None
     on5 = perpendicular_foot(L[5])
     wrist = (inverse(L[5]) @ [*on5, 1.0])[:3]

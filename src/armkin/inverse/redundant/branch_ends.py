@@ -147,7 +147,7 @@ def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Arra
         present = ~np.isnan(joints[:, 0])
         middle = margin(follower.arm, joints + 0.5 * np.where(gaps < MERGING, 1.0, 0.0)[:, None] * np.nan_to_num(step))
         room[rows] = np.where(present, middle, gone.room[rows])
-        met[rows] = (first[rows] == rows) | (present & (gaps <= tol.JOINED * gone.apart[rows, 0]))
+        met[rows] = (first[rows] == rows) | (present & (gaps <= tol.JOINED_SHARE * gone.apart[rows, 0]))
         leaders = rows[~met[rows]]
         first[leaders] = leaders
     return value, room

@@ -33,10 +33,10 @@ class Points(NamedTuple):
     @property
     def settled(self) -> Bool:
         """Whether rounding is all that is left (M,)."""
-        return np.asarray(self.step < tol.PAIR_SETTLED)
+        return np.asarray(self.step < tol.PAIR_STEP)
 
 
-def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: float = tol.PAIR_SETTLED) -> Points:
+def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: float = tol.PAIR_STEP) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
     The tangents point to where last does. tolerance: size of a step that is the last one.

@@ -230,7 +230,7 @@ def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
             costs(rows, t)
     # a sample beside which the motion grows both ways is at a kink or limit, and the nearest posture itself
     p = rows_of(curves.pieces, rows)
-    side_costs = [costs(rows, p.at + tol.PROBE * (end - p.at)) for end in (p.low, p.high)]
+    side_costs = [costs(rows, p.at + tol.PROBE_SHARE * (end - p.at)) for end in (p.low, p.high)]
     rows = rows[np.minimum(*side_costs) < motion(arm, p.start, near[rows])]
     p = rows_of(curves.pieces, rows)
     low, high, middle, value = golden_section(lambda t: costs(rows, t), p.low, p.high, curves.steps)
@@ -252,7 +252,7 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
     It may be a posture with a joint that is free, or one that its target's rounding moves far.
     """
     middle, half_width = 0.5 * (pieces.a + pieces.b), 0.5 * (pieces.b - pieces.a)
-    in_interval = np.abs(wrap_angle(near[:, joint] - middle)) <= half_width + tol.SAME
+    in_interval = np.abs(wrap_angle(near[:, joint] - middle)) <= half_width + tol.ROUNDING_DISTANCE
     cost = np.where(pieces.legal & in_interval, motion(arm, q, near), np.inf)
     postures = q.copy()
     for row in np.unique(pieces.row).tolist():

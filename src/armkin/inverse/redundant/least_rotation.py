@@ -101,12 +101,12 @@ def _newton_step(box: Box, local: _Local, x: Array, at_limit: Bool) -> _Move:
     at_limit &= low | high
     tangent = _tangent(local, at_limit)
     gradient = np.einsum("mij,mj->mi", tangent.P, local.g)
-    stationary = np.abs(gradient).max(axis=1) <= tol.STATIONARY
+    stationary = np.abs(gradient).max(axis=1) <= tol.STATIONARY_SLOPE
     # at a stationary point the limit whose multiplier points away from it most strongly is let go
     pull = np.where(at_limit & low, -tangent.slope, np.where(at_limit & high, tangent.slope, -np.inf))
-    leaves = stationary & (pull.max(axis=1) > tol.STATIONARY)
+    leaves = stationary & (pull.max(axis=1) > tol.STATIONARY_SLOPE)
     values, vectors = np.linalg.eigh(tangent.H)
-    in_position = np.abs(local.missed).max(axis=1) <= tol.SOLUTION * tol.SAME * 10
+    in_position = np.abs(local.missed).max(axis=1) <= tol.SOLUTION * tol.ROUNDING_DISTANCE * 10
     minimum = stationary & ~leaves & (values[:, 0] > -tol.LEVEL_CURVATURE) & in_position
     at_limit[leaves, pull.argmax(axis=1)[leaves]] = False
     saddle = stationary & ~leaves & ~minimum
@@ -155,7 +155,7 @@ def descend(arm: Arm, box: Box, q: Array, target: Array) -> tuple[Array, Bool]:
         miss = np.linalg.norm(goal[:, :3, 3] - T[:, :3, 3], axis=1) / arm.reach
         f = 0.5 * (3.0 - np.einsum("mij,mij->m", T[:, :3, :3], goal[:, :3, :3]))
         last_merit = local.f + 10.0 * np.linalg.norm(local.missed, axis=1)
-        is_better = (f + 10.0 * miss <= last_merit + tol.SOLUTION * tol.SAME) & ~move.rest & ~move.leaves
+        is_better = (f + 10.0 * miss <= last_merit + tol.SOLUTION * tol.ROUNDING_DISTANCE) & ~move.rest & ~move.leaves
         is_better &= ~(move.blocked & move.flat)
         go = active[is_better]
         q[go] = trial[is_better]

@@ -129,7 +129,7 @@ def _sorted_minima(arm: Arm, task: Task, q: Array, exact: int, target: Array, ne
     by_angle = np.argsort(angle, kind="stable")
     level = np.empty(len(q), int)  # angles that differ by rounding are one
     level[by_angle] = np.cumsum(np.diff(angle[by_angle], prepend=0.0) > tol.ONE_MINIMUM)
-    order = np.lexsort((motion.round(tol.EQUAL), searched, level))
+    order = np.lexsort((motion.round(tol.EQUAL_DECIMALS), searched, level))
     q, level = q[order], level[order]
     flat = flat_minima(arm, q, target)
     picked: list[int] = []
@@ -191,7 +191,7 @@ def _to_position(arm: Arm, box: Box, q: Array, point: Array, steps: int) -> tupl
         T, J = tip_and_jacobian(arm, q[active])
         c = (point[active] - T[:, :3, 3]) / arm.reach
         misses[active] = np.linalg.norm(c, axis=1)
-        is_open = misses[active] > tol.SOLUTION * tol.SAME
+        is_open = misses[active] > tol.SOLUTION * tol.ROUNDING_DISTANCE
         active, c, J = active[is_open], c[is_open], J[is_open, :3] * box.unit / arm.reach
         if step == steps or not len(active):
             break

@@ -93,7 +93,7 @@ class Traced(NamedTuple):
             q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
         return q
 
-    def _between(self, point: Int, share: Array, tolerance: float = tol.PAIR_SETTLED) -> Points:
+    def _between(self, point: Int, share: Array, tolerance: float = tol.PAIR_STEP) -> Points:
         """Points of the curves at shares (M,) of the way from points (M,) to those after them."""
         cubics = rows_of(self.ways, point)
         last = np.where(cubics.chord.any(axis=1, keepdims=True), cubics.chord, self.points.tangent[point])

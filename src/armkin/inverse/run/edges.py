@@ -134,7 +134,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         goal, reference = target[part], near[part]
         first, second, solved = _candidates_at_two(runner, goal, reference, reference + 1.0)
         differences = np.abs(first - second)
-        changed = ~((differences.max(axis=2) < tol.SAME) | is_plain[part])
+        changed = ~((differences.max(axis=2) < tol.ROUNDING_DISTANCE) | is_plain[part])
         k = np.flatnonzero(changed.any(axis=1) & ~(changed & solved.any(axis=0)).any(axis=1))
         if len(k):  # only some values of the free joints, or one, have solutions
             shift, single = runner.best_shift(goal[k], reference[k], changed[k])
@@ -146,7 +146,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
         doubts.first[part] = np.where(is_plain[part][:, :, None], doubts.first[part], first)
         doubts.second[part], doubts.loose[part] = np.where(changed[:, :, None], second, np.nan), changed
         differences = np.minimum(differences, np.abs(differences - 2 * np.pi))[:, :, list(runner.geometry.ends)]
-        doubts.ends[part] = (differences > tol.SAME).any(axis=(1, 2))
+        doubts.ends[part] = (differences > tol.ROUNDING_DISTANCE).any(axis=(1, 2))
     return doubts
 
 

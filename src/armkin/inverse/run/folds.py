@@ -22,7 +22,7 @@ from armkin.model.units import radian_or_reach
 
 SURE_FACTOR = 1.02  # results within this factor of SOLUTION are examined closely
 SYMMETRIC = 0.2  # largest relative difference of the slopes at a pair's ends
-PAIR_DISTANCE = 10.0 * tol.SAME  # closer branches [rad, reaches] are examined closely
+PAIR_DISTANCE = 10.0 * tol.ROUNDING_DISTANCE  # closer branches [rad, reaches] are examined closely
 
 
 class Doubted(NamedTuple):
@@ -43,14 +43,14 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
     """
     arm, task, target, near = goals
     solving = doubted.miss <= tol.SOLUTION**2
-    to_correct = solving & (doubted.miss >= tol.CLOSED**2)
+    to_correct = solving & (doubted.miss >= tol.ROUNDING_RESIDUAL**2)
     # a candidate with a slightly larger residual may be a branch
-    is_wrong = doubted.miss > np.where(doubted.edge, tol.SEED**2, tol.NEARBY**2)
+    is_wrong = doubted.miss > np.where(doubted.edge, tol.SEED_RESIDUAL**2, tol.NEARBY**2)
     decided: Bool = np.asarray(doubted.plain & solving.any(axis=1) & (solving | is_wrong).all(axis=1))
     k, b = np.nonzero(to_correct & decided[:, None])
     if len(k):
         doubted.q[k, b], size = newton.correct(arm, task, doubted.q[k, b], target[doubted.rows[k]], steps=3)
-        decided[k[size >= tol.CLOSED]] = False
+        decided[k[size >= tol.ROUNDING_RESIDUAL]] = False
     is_second = _second_of_pairs(goals, doubted, solving & (doubted.edge | (doubted.miss > tol.ACCEPTED**2)), decided)
     pairs: Bool = np.asarray(is_second.any(axis=1))
     listed = np.flatnonzero(decided & (pairs | (solving & (doubted.miss > tol.ACCEPTED**2)).any(axis=1)))
@@ -78,7 +78,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     row, i, j = np.nonzero(np.triu(near_roots[:, :, None] & near_roots[:, None], 1))
     i, j = index[row, i], index[row, j]
     step = newton.difference(goals.arm, q[j], q[i])
-    is_close = np.abs(step).max(axis=1) < tol.CLOSE_BY
+    is_close = np.abs(step).max(axis=1) < tol.CLOSE_DISTANCE
     partners = np.bincount(np.concatenate([i[is_close], j[is_close]]), minlength=len(k))
     decided[k[partners > 1]] = False
     if not decided[k].all():  # without Jacobians of undecided targets
@@ -86,7 +86,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
     i, j, step = i[is_close], j[is_close], step[is_close]
     is_double = np.abs(step).max(axis=1) < PAIR_DISTANCE
     inverse, beside = _bordered_inverses(goals, q)
-    is_weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLDED**2 >= 1.0
+    is_weak = (inverse * inverse).sum(axis=(1, 2)) * tol.FOLD_VALUE**2 >= 1.0
     partners[i[is_double]], is_weak[i[is_double]] = 0, True  # the first root of a double one represents both
     single = np.flatnonzero(is_weak & (partners == 0) & decided[k])
     if len(single):
@@ -190,4 +190,4 @@ def _unit_rows(rows: Array) -> Array:
 def _one_direction_lost(inverse: Array, column: Array, u: Array) -> Bool:
     """Whether only one direction is lost, by an upper bound of the inverse in all others; column: J^-1 u."""
     remaining = inverse - column @ u
-    return np.asarray((remaining * remaining).sum(axis=(1, 2)) * tol.HIGH**2 < 1.0)
+    return np.asarray((remaining * remaining).sum(axis=(1, 2)) * tol.HIGH_ORDER**2 < 1.0)

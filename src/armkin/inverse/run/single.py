@@ -52,7 +52,7 @@ class OneTarget:
         self._point, self._home, self._room = point_numbers(arm), arm.home, ROOM * arm.reach
         self._coarse = COARSE_ROOM * arm.reach if self.orientation == "full" else 0.0
         self._home_tip = self._point(*arm.home.tolist())
-        self._close = [tol.THERE * unit for unit in radian_or_reach(arm).tolist()]
+        self._close = [tol.STANDING_DISTANCE * unit for unit in radian_or_reach(arm).tolist()]
         output_axes, axes = runner.code.axes(), runner.axes
         self.count = math.prod(axes)
         self._plain = [not a for a in output_axes]  # whether an output is a number instead of a tuple

@@ -42,8 +42,8 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
     joints, uncrossed = at.joints.copy(), at.uncrossed.copy()
     residual = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.CLOSED), at.followed)
-    begun = np.flatnonzero(goes_on & (at.second > tol.HIGH))
+    goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.ROUNDING_RESIDUAL), at.followed)
+    begun = np.flatnonzero(goes_on & (at.second > tol.HIGH_ORDER))
     if not len(begun):
         return Followed(in_chains, known, manifold, boundary, joints, ended, ended & uncrossed)
     least_way, most_way = at.least_way.copy(), at.most_way.copy()
@@ -57,7 +57,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
             break
         row, start, every = posture[chains], end[chains], np.arange(len(chains))
         link = structure_ahead(arm, task, start, target[row], span[chains], heading[chains])
-        holds = link.followed & (link.second > tol.HIGH)
+        holds = link.followed & (link.second > tol.HIGH_ORDER)
         span[chains] *= link.span_ratio
         link_end, link_heading = leave_spans(arm, link, every, start, link.v)
         # a curve closes where its two sides meet: a step may pass where the other was, or now is
@@ -76,7 +76,7 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
         closes = passed[:, -2:].any(axis=1)
         finished[chains[closes]] = finished[opposite[closes]] = True
         enough = ~at.known & ((count == FEW_LINKS) | ((most_way - least_way).max(axis=1) >= tol.REACH))
-        chains = chains[~(finished[chains] | enough[row]) & (link.second > tol.HIGH)]
+        chains = chains[~(finished[chains] | enough[row]) & (link.second > tol.HIGH_ORDER)]
     extent, ended[begun] = (most_way - least_way)[begun], finished.reshape(2, -1).all(axis=0)
     manifold[begun] = extent.max(axis=1) >= tol.REACH
     known[begun], boundary[begun] = manifold[begun] | ended[begun], boundary[begun] & ~manifold[begun]

@@ -40,7 +40,7 @@ def examine(
     self-motions that may meet others. unsettled: (K,) targets whose solver may have lost singular candidates: `more`
     is called for these, and for all that are singular. incomplete: (K,) targets that `more` takes for lost.
     """
-    state = _settle_seeds(goals, seeds, tol.SEED)
+    state = _settle_seeds(goals, seeds, tol.SEED_RESIDUAL)
     retry = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
     if unsettled is None:
         # a self-motion of joints more than one apart goes through postures in which others move, too
@@ -96,7 +96,7 @@ class _Components:
         self.rank = np.maximum(candidates.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
         self.ungrouped: Bool = self.valid & ~simple  # whether it is in no group yet
-        self.near_singular: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLDED) & ~on_motion
+        self.near_singular: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLD_VALUE) & ~on_motion
         lost.sigma[on_motion] = 0.0
         self.followed: Bool = ~(self.ungrouped & self.near_singular)  # whether its component is followed, if need be
         self.pushed = self.followed.copy()  # whether it is pushed, if need be
@@ -140,7 +140,7 @@ class _Components:
             self.ended[i, c], self.uncrossed[i, c] = curve.ended, curve.uncrossed
             self.component_row[i, c] = np.where(curve.known, len(self.components) + np.arange(len(i)), 0)
             self.components = np.concatenate([self.components, curve.members])
-        self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING)
+        self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING_VALUE)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
     def _push(self, k: Int, b: Int) -> None:
@@ -159,8 +159,8 @@ class _Components:
         (q, _, size, *_), (arm, task, target, _), sigma = self.candidates, self.goals, self.lost.sigma
         self.component_row[k, b] = len(self.components) + np.arange(len(k))
         alike, distance = high_order_roots.equal_candidates(arm, task, q, k, b, sigma, size, target)
-        has_twin = (alike & self.valid[k] & (distance > tol.SAME)).any(axis=1)
-        self.is_boundary[k, b] = has_twin | (sigma[k, b] < tol.DOUBLE)
+        has_twin = (alike & self.valid[k] & (distance > tol.ROUNDING_DISTANCE)).any(axis=1)
+        self.is_boundary[k, b] = has_twin | (sigma[k, b] < tol.DOUBLE_VALUE)
         self.components = np.concatenate([self.components, alike])
 
     def _inherit_manifolds(self, k: Int, b: Int, alike: Bool) -> None:
@@ -168,11 +168,11 @@ class _Components:
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
         """
-        is_vague = (self.tube[k, b] > tol.TURNED) & self.known[k, b] & ~self.on_manifold[k, b]
+        is_vague = (self.tube[k, b] > tol.STILL_TURN) & self.known[k, b] & ~self.on_manifold[k, b]
         if not is_vague.any():
             return
         alike_vague = alike & is_vague[:, None]
-        i, c = np.nonzero(alike_vague & (self.tube[k] > tol.TURNED))
+        i, c = np.nonzero(alike_vague & (self.tube[k] > tol.STILL_TURN))
         self._follow(k[i], c)
         i, c = np.nonzero(alike_vague & self.known[k] & self.on_manifold[k])
         has_own = self.components[self.component_row[k[i], c], b[i]]
@@ -198,7 +198,7 @@ class _Groups(_Components):
         close = np.zeros((len(valid), M, M), bool)
         k, i, j = np.nonzero(unsure[:, :, None] & unsure[:, None] & is_other)
         offset = newton.difference(self.goals.arm, self.candidates.q[k, i], self.candidates.q[k, j])
-        close[k, i, j] = np.abs(offset).max(axis=1, initial=0.0) < tol.CLOSE_BY
+        close[k, i, j] = np.abs(offset).max(axis=1, initial=0.0) < tol.CLOSE_DISTANCE
         near_singular = unsure & self.near_singular
         decided = near_singular & (self.component_row > 0) & ~self.on_manifold
         may_move = near_singular & ~(decided & self.known & (sigma >= tol.SOLUTION))
@@ -214,7 +214,7 @@ class _Groups(_Components):
             pairable &= (alike.sum(axis=2) < 2) & ~alike[:, :, 0]
             pairable &= (~alike | pairable[:, None]).all(axis=2)
             # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            size = np.maximum(self.candidates.size[rows], np.where(known, tol.CLOSED, 0.0))
+            size = np.maximum(self.candidates.size[rows], np.where(known, tol.ROUNDING_RESIDUAL, 0.0))
             rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
             leads = pairable & ~(alike & (rank[:, None] < rank[:, :, None])).any(axis=2)
             self.chosen[rows] |= leads
@@ -234,7 +234,7 @@ class _Groups(_Components):
         arm, near = self.goals.arm, self.goals.near
         q, label, size, *_ = self.candidates
         known = self.known[k, b]
-        size = np.where(known[:, None], np.maximum(size[k], tol.CLOSED), size[k])  # as in `_group_plain`
+        size = np.where(known[:, None], np.maximum(size[k], tol.ROUNDING_RESIDUAL), size[k])  # as in `_group_plain`
         offset = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
         group: Bool = np.asarray(self.components[self.component_row[k, b]])
         unlisted = ~(group & self.candidates.simple[k]).any(axis=1)
@@ -274,7 +274,7 @@ class _Groups(_Components):
         held_offset = np.where(joints[:, None], 0.0, offset).max(axis=2)
         moving = self.on_manifold[k, b] & ~self.ended[k, b]  # all that is on other components is one with them
         # two postures of one self-motion may each be off by as much as a double root
-        shared: Bool = moving[:, None] & (held_offset < 3 * tol.TURNED) & (self.lost.sigma[k] < tol.SOLUTION)
+        shared: Bool = moving[:, None] & (held_offset < 3 * tol.STILL_TURN) & (self.lost.sigma[k] < tol.SOLUTION)
         shared &= self.ungrouped[k]
         unsure = shared & ~group & (joints.sum(axis=1) > 2)[:, None]
         rows = np.flatnonzero(unsure.any(axis=1))
@@ -321,7 +321,7 @@ class _Groups(_Components):
             self._group(k, np.where(self.ungrouped[k], self.rank[k], np.inf).argmin(axis=1))
         moving = np.asarray(self.chosen_joints.any(axis=2))
         # a root of high order may also lie beside a self-motion
-        has_root_beside = (self.chosen & (self.lost.sigma < tol.HIGH) & ~moving).any(axis=1) & moving.any(axis=1)
+        has_root_beside = (self.chosen & (self.lost.sigma < tol.HIGH_ORDER) & ~moving).any(axis=1) & moving.any(axis=1)
         rows = np.flatnonzero((self.chosen_joints & ~self.candidates.sure).any(axis=(1, 2)) | has_root_beside)
         if len(rows):
             self._drop_repeated(rows)
@@ -357,7 +357,7 @@ def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
     size, rows = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
     size[rows] = newton.misses(arm, task, flat[rows], target[goal[rows]])
     out_of_reach, is_near = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
-    inexact = np.flatnonzero(~(is_near | sure.reshape(-1, n).any(axis=1) | (size < tol.CLOSED)))
+    inexact = np.flatnonzero(~(is_near | sure.reshape(-1, n).any(axis=1) | (size < tol.ROUNDING_RESIDUAL)))
     if len(inexact):
         rows = inexact[size[inexact] < seed_limit]
         unsolved = rows[size[rows] > tol.SOLUTION]

@@ -63,13 +63,13 @@ class Curves:
         landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
         heading = _next_directions(V, second, last_heading)
         cosine = np.linalg.norm(heading, axis=1)
-        good = (size < tol.OFF_CURVE) & (cosine > STRAIGHT)
+        good = (size < tol.OFF_CURVE_RESIDUAL) & (cosine > STRAIGHT)
         last_q = self.q[rows]
         self.q[rows[good]], self._heading[rows[good]] = landed[good], heading[good] / cosine[good, None]
         self._length[rows] = length = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * length)
         self._steps[rows] += 1
         is_stuck, is_long = ~good & (length < tol.SHORTEST_STEP), self._steps[rows] == MAX_STEPS
-        unsure = (second < tol.CROSSING) | (is_stuck & (size < tol.OFF_CURVE)) | is_long
+        unsure = (second < tol.CROSSING_VALUE) | (is_stuck & (size < tol.OFF_CURVE_RESIDUAL)) | is_long
         step = Step(rows, last_q, newton.difference(arm, self.q[rows], last_q), np.asarray(unsure))
         at_start = step.passes(arm, self._start[rows], np.arange(len(rows)))
         self.closed[rows] = at_start & good & (self._steps[rows] > 2)
@@ -79,14 +79,14 @@ class Curves:
 
 def _longest_steps(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
-    return np.asarray(np.where(second < tol.CROSSING, CROSSING_STEP, np.minimum(STEP, BEND * second)))
+    return np.asarray(np.where(second < tol.CROSSING_VALUE, CROSSING_STEP, np.minimum(STEP, BEND * second)))
 
 
 def _next_directions(V: Array, second: Array, directions: Array) -> Array:
     """What is lost of the directions (M, n) of steps: V (M, n, n) the smallest singular value's first."""
     components = np.einsum("mij,mi->mj", V, directions)
     components[:, 2:] = 0.0
-    components[second >= tol.CROSSING, 1] = 0.0
+    components[second >= tol.CROSSING_VALUE, 1] = 0.0
     return np.asarray(np.einsum("mij,mj->mi", V, components))
 
 
@@ -99,7 +99,7 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
     r, J = newton.scaled(arm, task, q, target)
     J = J * joints[:, None]
     L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
-    gain = np.where(L > tol.ACROSS, 1.0 / np.maximum(L, tol.ACROSS), 0.0)
+    gain = np.where(L > tol.STEP_VALUE_SQUARED, 1.0 / np.maximum(L, tol.STEP_VALUE_SQUARED), 0.0)
     gain[:, 0] = 0.0
     pull_back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
@@ -126,7 +126,7 @@ def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array,
         compared = compared & ~is_linkage[:, None]
     curve, column = np.nonzero(compared)
     _, V, second, _ = _onto_curve(arm, task, q, joints, target)
-    direction, met = V[:, :, 0], np.asarray(second < tol.CROSSING)[curve]
+    direction, met = V[:, :, 0], np.asarray(second < tol.CROSSING_VALUE)[curve]
     if len(walked := np.flatnonzero(~met)):
         rows, place = np.unique(curve[walked], return_inverse=True)
         twin, directions = np.tile(rows, 2), np.concatenate([direction[rows], -direction[rows]])

@@ -23,14 +23,16 @@ def solves_between(arm: Arm, task: Task, q: Array, offset: Array, miss: Array, s
 
     miss, sigma: (M,) residual and smallest singular value of the one whose Newton step, their quotient, is longer.
     Beside the posture half way is looked only where this one is no exact root: isolated roots have none in between.
-    Steps back onto the curve leave out directions weaker than `HIGH`.
+    Steps back onto the curve leave out directions weaker than `HIGH_ORDER`.
     """
     halfway = q + 0.5 * offset * radian_or_reach(arm)
     solves = newton.misses(arm, task, halfway, target) <= tol.SOLUTION
     distance = np.abs(offset).max(axis=1)
-    doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH) & (miss > ROOT * distance * sigma))
+    doubtful = np.flatnonzero(~solves & (sigma < tol.HIGH_ORDER) & (miss > ROOT * distance * sigma))
     if len(doubtful):
-        beside, beside_miss = newton.correct(arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH)
+        beside, beside_miss = newton.correct(
+            arm, task, halfway[doubtful], target[doubtful], steps=3, least=tol.HIGH_ORDER
+        )
         moved = np.abs(newton.difference(arm, beside, halfway[doubtful])).max(axis=1)
         solves[doubtful] = (moved < BESIDE_SHARE * distance[doubtful]) & (beside_miss <= tol.SOLUTION)
     return np.asarray(solves)
@@ -45,7 +47,7 @@ def equal_candidates(
     """
     distance = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
     alike = distance < _rounding_radius(np.minimum(sigma[k], sigma[k, b][:, None]))
-    row, column = np.nonzero(~alike & (distance < tol.CLOSE_BY))
+    row, column = np.nonzero(~alike & (distance < tol.CLOSE_DISTANCE))
     if len(row):
         start = q[k[row], b[row]]
         offset = newton.difference(arm, q[k[row], column], start)
@@ -65,7 +67,7 @@ def equal_candidates(
 
 def _rounding_radius(sigma: Array) -> Array:
     """How far rounding may part two candidates of one root, the smaller of whose smallest singular values is sigma."""
-    return np.asarray(tol.SAME + np.minimum(tol.ERROR / np.maximum(sigma, tol.TINY), tol.DOUBLE_ROOT))
+    return np.asarray(tol.ROUNDING_DISTANCE + np.minimum(tol.ERROR / np.maximum(sigma, tol.TINY), tol.DOUBLE_DISTANCE))
 
 
 def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
@@ -85,7 +87,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     forward, backward = np.split(newton.residuals(arm, task, ends, goals), 2)
     bend = (u * (forward + backward - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     along_u = (u * r).sum(axis=1)
-    remainder = np.linalg.norm(r - along_u[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH)
-    is_fold = (S[:, -2] > tol.HIGH) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.BENT)
+    remainder = np.linalg.norm(r - along_u[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH_ORDER)
+    is_fold = (S[:, -2] > tol.HIGH_ORDER) & (S[:, -1] < tol.WEAK) & (np.abs(bend) > tol.FOLD_BEND)
     has_no_root = (along_u * bend > 0.0) & (np.abs(along_u) > 10.0 * tol.SOLUTION)
     return np.asarray(is_fold & has_no_root & (remainder < tol.FOLD_WAY) & (100.0 * remainder**2 < np.abs(along_u)))

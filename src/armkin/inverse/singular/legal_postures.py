@@ -60,7 +60,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
 def _at_limits(arm: Arm, q: Array) -> Bool:
     """Which joints of postures (..., n) are within limits or at one."""
     excess = np.maximum(np.maximum(arm.lower - q, q - arm.upper), 0.0) / radian_or_reach(arm)
-    return np.asarray(excess < tol.SAME)
+    return np.asarray(excess < tol.ROUNDING_DISTANCE)
 
 
 def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
@@ -74,7 +74,7 @@ def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
     undecided = undecided[~legal[undecided]]
     if len(undecided):
         sigma, *_ = newton.null_space(arm, task, batch.q[rows[k[undecided]], b[undecided]], target[rows[k[undecided]]])
-        legal[undecided] = sigma < tol.CLOSED
+        legal[undecided] = sigma < tol.ROUNDING_RESIDUAL
     return np.bincount(k[legal], minlength=len(rows)) > 0
 
 

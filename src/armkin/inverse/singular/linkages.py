@@ -49,10 +49,10 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     tried = ~np.isnan(q[..., 0]) & loose[:, None]
     miss = np.full(tried.shape, np.inf)
     miss[tried] = newton.misses(arm, task, q[tried], np.repeat(target, tried.sum(axis=(1, 2)), axis=0))
-    solving, near_miss = miss < tol.CLOSED, newton.misses(arm, task, near, target)
+    solving, near_miss = miss < tol.ROUNDING_RESIDUAL, newton.misses(arm, task, near, target)
     decided, motions = _find_motions(goals, q, solving, loose)
     lacking = np.asarray((loose & (solving.sum(axis=1) < 2)).any(axis=1))
-    decided &= ~lacking & ~((near_miss > tol.CLOSED) & (near_miss <= tol.SOLUTION))
+    decided &= ~lacking & ~((near_miss > tol.ROUNDING_RESIDUAL) & (near_miss <= tol.SOLUTION))
     leader, is_apart = _first_columns(arm, motions, loose)
     decided &= is_apart
     circuit = np.zeros((K, S, B), bool)
@@ -73,7 +73,7 @@ def settle(goals: Goals, q: Array, loose: Bool) -> Linkages:
     listed = np.zeros(key.shape, bool)
     np.put_along_axis(listed, order, leads, axis=1)
     listed &= key < 2 * B
-    if (stands := decided & (near_miss <= tol.CLOSED)).any():
+    if (stands := decided & (near_miss <= tol.ROUNDING_RESIDUAL)).any():
         decided &= _list_near(goals, q, listed, key, motions, leader, loose, stands)
     decided &= _one_direction(goals, q, listed & decided[:, None], key)
     listed &= decided[:, None]
@@ -86,10 +86,10 @@ def _find_motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[B
     """What the loose candidates solving (K, S, B) their targets move on; known: (K,) if it is all known."""
     arm, task, target, _ = goals
     base = np.take_along_axis(q, solving.argmax(axis=1)[:, None, :, None], axis=1)[:, 0]
-    moved = np.abs(newton.difference(arm, q, base[:, None])) > tol.SAME
+    moved = np.abs(newton.difference(arm, q, base[:, None])) > tol.ROUNDING_DISTANCE
     moving: Bool = np.asarray((moved & solving[..., None]).any(axis=1))
     step = newton.difference(arm, q[:, 1], q[:, 0])
-    same_pace = ((np.abs(np.abs(step) - 1.0) < tol.SAME) & ~arm.prismatic | ~moving).all(axis=2)
+    same_pace = ((np.abs(np.abs(step) - 1.0) < tol.ROUNDING_DISTANCE) & ~arm.prismatic | ~moving).all(axis=2)
     first, last, count = moving.argmax(axis=2), arm.n - 1 - moving[:, :, ::-1].argmax(axis=2), moving.sum(axis=2)
     line: Bool = np.asarray(loose & solving[:, 0] & solving[:, 1] & same_pace & (count == 2) & (last - first == 2))
     d = np.where(line[:, :, None], np.where(moving, np.sign(step), 0.0), moving)
@@ -97,7 +97,7 @@ def _find_motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[B
     if len(k):
         places = (q[k, 0, b][:, None] + PLACES * d[k, b][:, None]).reshape(-1, arm.n)
         miss = newton.misses(arm, task, places, np.repeat(target[k], len(PLACES), axis=0)).reshape(-1, len(PLACES))
-        line[k, b] = (miss < tol.CLOSED).all(axis=1)
+        line[k, b] = (miss < tol.ROUNDING_RESIDUAL).all(axis=1)
     joint = np.full(line.shape, -1)
     k, b = np.nonzero(loose & (count == 4))
     bars = np.zeros_like(line)
@@ -126,7 +126,7 @@ def _first_columns(arm: Arm, motions: _Motions, loose: Bool) -> tuple[Int, Bool]
     sense = motions.d.prod(axis=2, where=motions.d != 0.0)
     alike &= sense[:, :, None] == sense[:, None]
     pair = loose[:, :, None] & loose[:, None] & ~np.eye(B, dtype=bool)
-    shared = pair & alike & (held_offset < tol.TURNED)
+    shared = pair & alike & (held_offset < tol.STILL_TURN)
     is_apart = ~(pair & ~shared & ~(held_offset > tol.APART_ROOTS)).any(axis=(1, 2))
     return np.where(shared, np.arange(B), B).min(axis=2, initial=B).clip(max=np.arange(B)), np.asarray(is_apart)
 
@@ -139,7 +139,7 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
             break
         row, column = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
         _, J = newton.scaled(goals.arm, goals.task, q[k[row], column], goals.target[k[row]])
-        is_regular = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLDED], minlength=len(k)) > 0
+        is_regular = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLD_VALUE], minlength=len(k)) > 0
         k, m, listed = k[~is_regular], m[~is_regular], np.ones_like(listed)
     regular = np.ones(len(q), bool)
     regular[k] = False
@@ -159,8 +159,8 @@ def _list_near(
     held_offset = _held_difference(arm, near[k, None], motions.base[k], motions.d[k], motions.line[k])
     held_offset = np.where(loose[k], held_offset, np.inf)
     b, least_offset = held_offset.argmin(axis=1), held_offset.min(axis=1)
-    decided[k[(least_offset >= tol.TURNED) & (least_offset < tol.APART_ROOTS)]] = False
-    k, b = k[least_offset < tol.TURNED], b[least_offset < tol.TURNED]
+    decided[k[(least_offset >= tol.STILL_TURN) & (least_offset < tol.APART_ROOTS)]] = False
+    k, b = k[least_offset < tol.STILL_TURN], b[least_offset < tol.STILL_TURN]
     own_key = 2 * leader[k, b]
     if len(p := np.flatnonzero(motions.joint[k, b] >= 0)):
         own_key[p] += four_bars.sides(arm, near[k[p]], motions.d[k[p], b[p]] != 0.0, motions.joint[k[p], b[p]])

@@ -95,7 +95,7 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
         w = _second_order(arm, task, q, target, linear, curve)
         # the first span is twice as long as the component is by its second order
         estimate = 2.0 * np.maximum(-curve.low, curve.high)
-        is_short = ~curve.known & (estimate > 0.0) & (2.0 * estimate < full_span) & (curve.second > tol.HIGH)
+        is_short = ~curve.known & (estimate > 0.0) & (2.0 * estimate < full_span) & (curve.second > tol.HIGH_ORDER)
         curve.span[is_short], w[~is_short] = estimate[is_short], 0.0
     starts = _Start(q, target, linear.U[:, :, n - 1 :], linear.V[:, -1], w, curve.span)
     unknown = np.flatnonzero(~curve.known)
@@ -104,7 +104,9 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
             break
         holds = _follow_spans(arm, task, starts, curve, unknown, BOTH_WAYS)
         # a shorter span helps neither where two directions are all but lost nor where the component leaves this one
-        unknown = unknown[~curve.known[unknown] & (curve.second[unknown] > tol.HIGH) & (is_short[unknown] | ~holds)]
+        unknown = unknown[
+            ~curve.known[unknown] & (curve.second[unknown] > tol.HIGH_ORDER) & (is_short[unknown] | ~holds)
+        ]
         span, bend_span = curve.span[unknown], BEND * curve.second[unknown]
         shorter_span = np.where(2.0 * bend_span < span, bend_span, span / SHRINK)
         curve.span[unknown] = np.where(is_short[unknown], full_span[unknown], shorter_span)
@@ -154,7 +156,7 @@ def _follow_spans(arm: Arm, task: Task, starts: _Start, curve: Structure, rows: 
     holds, span_ratio, uncrossed, x, g = _fit_polynomials(arm, task, start, side)
     # Newton's method may have found another curve close by: then x(0) is not the posture
     slack = tol.SOLUTION / np.maximum(curve.second[rows], tol.TINY)
-    holds &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH * span + slack)
+    holds &= np.abs(x[0]).max(axis=1) <= 4.0 * (tol.SMOOTH_ERROR * span + slack)
     curve.span_ratio[rows], curve.followed[rows] = np.where(holds, span_ratio, FAILED_RATIO), holds
     if len(rows := rows[holds]):
         curve.x[:, rows], curve.g[:, rows], curve.uncrossed[rows] = x[:, holds], g[:, holds], uncrossed[holds]
@@ -189,7 +191,7 @@ def _second_order(arm: Arm, task: Task, q: Array, target: Array, linear: newton.
     has_turn = sigma**2 < 2.0 * tol.SOLUTION * bend
     h = np.where(has_turn, 4.0 * np.sqrt(tol.SOLUTION / bend), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY))
     # what solves the target beside the curve must not pass for its ends
-    undecided = (h <= SERIES) & ((r * r).sum(axis=1) < tol.CLOSED**2) & (S[:, -2] * h > 4.0 * tol.SOLUTION)
+    undecided = (h <= SERIES) & ((r * r).sum(axis=1) < tol.ROUNDING_RESIDUAL**2) & (S[:, -2] * h > 4.0 * tol.SOLUTION)
     h = np.minimum(h, SERIES)
     correction, last_offset = np.zeros((2, *v.shape)), np.inf
     for _ in range(BACK):
@@ -230,7 +232,7 @@ def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[B
     last = np.abs(np.tensordot(TO_LAST, values, axes=1)).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         error = np.maximum(
-            last[:, :n].max(axis=1) / (tol.SMOOTH * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION)
+            last[:, :n].max(axis=1) / (tol.SMOOTH_ERROR * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION)
         )
         # the last coefficients grow with the span to that power
         span_ratio = side.gain * np.minimum(0.9 * error ** (1.0 / (2 - NODES)), MAX_RATIO) - USED_SHARE
@@ -270,7 +272,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
         x[:, part], along_u[:, part], inverse[:, part] = way + step[:, :, :n], step[:, :, n:], inverted
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # Newton's method squares the error: the next step is about size^3 / last_size^2 long
-        arrived = (size < tol.ARRIVED) | (size**3 < tol.ERROR * last_size[part] ** 2)
+        arrived = (size < tol.ARRIVED_STEP) | (size**3 < tol.ERROR * last_size[part] ** 2)
         at_hand = (np.abs(x[:, part]).max(axis=2) < 3.0 * np.abs(t[:, part, 0])).all(axis=0) & (size < size_limit[part])
         holds[part], size_limit[part], last_size[part] = arrived & at_hand, 0.5 * size, size
         active = active[~arrived & at_hand]
@@ -373,5 +375,5 @@ def members(structure: Structure, rows: Int, way: Array) -> Bool:
     offset = np.abs(way - x).max(axis=2)
     in_range = (t >= (structure.low[rows] - slack)[:, None]) & (t <= (structure.high[rows] + slack)[:, None])
     return np.asarray(
-        structure.followed[rows, None] & in_range & (offset <= (4.0 * tol.SMOOTH * span + slack)[:, None])
+        structure.followed[rows, None] & in_range & (offset <= (4.0 * tol.SMOOTH_ERROR * span + slack)[:, None])
     )

@@ -24,7 +24,7 @@ BOW = 0.1  # distance of a curve from its chord, at most, relative to the chord'
 PLANE_DIRECTIONS = 256  # directions in a plane, each of which stands for its opposite, too
 EDGE_POINTS = 64  # points along each edge of a cube whose sides hold directions in space
 SAMPLE = 61  # stride of the directions asked first: most curves have one below what all must exceed
-ALL_ROUND = 5.0 * tol.BENT  # curvature [1/rad] in all directions: a residual has passed `SOLUTION` 1e-3 rad away
+ALL_ROUND = 5.0 * tol.FOLD_BEND  # curvature [1/rad] in all directions: a residual has passed `SOLUTION` 1e-3 rad away
 THIRD = 0.03  # singular value of the third direction, which bends the curves by its inverse
 SPREAD = 5.0  # factor on that curvature in some direction: no surface of solutions, and the zeros are clear
 
@@ -40,7 +40,7 @@ def separate(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
     k, b = np.nonzero((size[:, 1:] <= tol.SOLUTION) & (lost.nullity[:, 1:] > 1))
     b += 1
     weak, nullity = rows_of(lost.weak, lost.place[k, b]), lost.nullity[k, b]
-    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / tol.HIGH)
+    rounded = np.rint(newton.difference(arm, q[k, b], np.zeros(arm.n)) / tol.HIGH_ORDER)
     _, first, group = np.unique(np.column_stack([k, rounded]), axis=0, return_index=True, return_inverse=True)
     row = k[first]
     most = np.maximum(tol.ACCEPTED, 2.0 * size[row, b[first]])

@@ -67,11 +67,11 @@ def _put_near_in_chunk(goals: Goals, batch: Batch, rows: Int) -> Int:
     distance = np.where(batch.valid[rows], distance, np.inf)
     place = distance.argmin(axis=1)
     least_distance = distance.min(axis=1)
-    has_branch, solves = least_distance <= tol.THERE, np.ones(len(rows), bool)
+    has_branch, solves = least_distance <= tol.STANDING_DISTANCE, np.ones(len(rows), bool)
     unsure = np.flatnonzero(~has_branch)
     if len(unsure):
         solves[unsure] = newton.misses(arm, task, near[unsure], target[unsure]) <= tol.SOLUTION
-        unsure = unsure[solves[unsure] & ((distance[unsure] < tol.CLOSE_BY).sum(axis=1) == 1)]
+        unsure = unsure[solves[unsure] & ((distance[unsure] < tol.CLOSE_DISTANCE).sum(axis=1) == 1)]
         offset = newton.difference(arm, batch.q[rows[unsure], place[unsure]], near[unsure])
         between = near[unsure] + 0.5 * offset * radian_or_reach(arm)
         has_branch[unsure] = newton.misses(arm, task, between, target[unsure]) <= tol.SOLUTION
@@ -107,7 +107,7 @@ def list_near(goals: Goals, batch: Batch, bounds: Array) -> Batch:
     offset = newton.difference(arm, batch.q[rows], near[rows, None])
     distance = np.where(batch.valid[rows], np.abs(offset).max(axis=2), np.inf)
     distance = np.pad(distance, ((0, 0), (0, 1)), constant_values=np.inf)
-    is_one, is_nearest = distance <= tol.THERE, distance == distance.min(axis=1, keepdims=True)
+    is_one, is_nearest = distance <= tol.STANDING_DISTANCE, distance == distance.min(axis=1, keepdims=True)
     has_q = distance < np.inf
     for tried, steps in (is_nearest, 0), (has_q, 0), (has_q, 6):  # in the last the component may bend
         k, b = np.nonzero(tried & has_q & ~is_one.any(axis=1, keepdims=True))

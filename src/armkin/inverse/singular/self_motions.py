@@ -35,15 +35,15 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
     for k in np.flatnonzero((chosen & curve.any(axis=2)).any(axis=1)):
         moving = np.flatnonzero(chosen[k] & curve[k].any(axis=1))
         narrow = curve[k, moving].sum(axis=1) <= arm.n // 2
-        for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH) & ~curve[k].any(axis=1)):
+        for i in np.flatnonzero(chosen[k] & (sigma[k] < tol.HIGH_ORDER) & ~curve[k].any(axis=1)):
             offset = np.where(curve[k, moving], 0.0, np.abs(newton.difference(arm, q[k, moving], q[k, i]))).max(axis=1)
-            pairs += [(int(k), int(i), int(j)) for j in moving[(offset < tol.CLOSE_BY) & narrow]]
+            pairs += [(int(k), int(i), int(j)) for j in moving[(offset < tol.CLOSE_DISTANCE) & narrow]]
         moving = moving[sigma[k, moving] < tol.SOLUTION]  # a double root's listed posture may be off it
         for i in moving[moving > 0]:
             wider = [j for j in moving if (curve[k, j] > curve[k, i]).any() and not (curve[k, i] > curve[k, j]).any()]
             wider = [j for j in wider if not (curve[k, j] & resting[k, i] & ~curve[k, i]).any()]
             offset = np.abs(newton.difference(arm, q[k, wider], q[k, i]))
-            if len(wider) and (np.where(curve[k, wider], 0.0, offset).max(axis=1) < tol.TURNED).any():
+            if len(wider) and (np.where(curve[k, wider], 0.0, offset).max(axis=1) < tol.STILL_TURN).any():
                 chosen[k, i] = False
     if pairs:
         row, root, mate = np.array(pairs).T
@@ -63,12 +63,12 @@ def _joins_motion(arm: Arm, task: Task, q: Array, motions: Array, curve: Bool, t
     sigma, V, _ = newton.null_space(arm, task, q, target)
     held_v = np.where(curve, 0.0, V[:, -1])
     t = (offset * held_v).sum(axis=1) / np.maximum((held_v * held_v).sum(axis=1), tol.TINY)
-    tilted = offset + np.where(curve, V[:, -1] * np.clip(t, -tol.CLOSE_BY, tol.CLOSE_BY)[:, None], 0.0)
+    tilted = offset + np.where(curve, V[:, -1] * np.clip(t, -tol.CLOSE_DISTANCE, tol.CLOSE_DISTANCE)[:, None], 0.0)
     q, goal, sigma = np.concatenate([q, q]), np.concatenate([target, target]), np.concatenate([sigma, sigma])
     start = q + np.concatenate([offset, tilted]) * unit
     landed, size = newton.correct(arm, task, start, goal, steps=6, least=tol.WEAK)
     step = newton.difference(arm, landed, q)
-    close = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(step).max(axis=1) < tol.CLOSE_BY))
+    close = np.flatnonzero((size <= tol.SOLUTION) & (np.abs(step).max(axis=1) < tol.CLOSE_DISTANCE))
     miss, is_one = newton.misses(arm, task, q[close], goal[close]), np.zeros(len(q), bool)
     is_one[close] = high_order_roots.solves_between(arm, task, q[close], step[close], miss, sigma[close], goal[close])
     return np.asarray(is_one.reshape(2, -1).any(axis=0))
@@ -94,22 +94,22 @@ def drop_twins(goals: Goals, q: Array, chosen: Bool, curve: Bool, ended: Bool, l
     is_one, distance = linked[k, i, j], np.abs(offset)
     # one of the two postures may be where its own self-motion meets the other's
     turned = np.where(curve[k, i], 0.0, distance).max(axis=1)
-    width = np.maximum(tol.TURNED, tube[k, i] + tube[k, j])
+    width = np.maximum(tol.STILL_TURN, tube[k, i] + tube[k, j])
     is_close = (turned < width) & ((distance > width[:, None]).sum(axis=1) <= LINE_JOINTS)
     # at one of the two postures a joint may move too slowly to be called free
     most_turned = np.maximum(turned, np.where(curve[k, j], 0.0, distance).max(axis=1))
-    is_slow = ~is_close & (most_turned > tol.TURNED) & (most_turned < tol.DRIFT)
+    is_slow = ~is_close & (most_turned > tol.STILL_TURN) & (most_turned < tol.DRIFT)
     is_close |= np.equal(j, 0)  # `near` stands for all that meet there
     unsure = np.flatnonzero(is_close & ~is_one)
     is_one[unsure] = _moves_straight(arm, task, start[unsure], offset[unsure], target[k[unsure]])
     slow = np.flatnonzero(is_slow & ~is_one)
     if len(slow):  # whether the self-motion of the one goes round to the other
-        joints = curve[k[slow], i[slow]] | (distance[slow] > tol.SAME)
+        joints = curve[k[slow], i[slow]] | (distance[slow] > tol.ROUNDING_DISTANCE)
         end, compared = (start[slow] + offset[slow] * unit)[:, None], np.ones((len(slow), 1), bool)
         is_one[slow] = curves.share_circuit(arm, task, start[slow], joints, end, compared, target[k[slow]])[:, 0]
     k, i, j = k[is_one], i[is_one], j[is_one]
     motion = np.abs(newton.difference(arm, q, near[:, None])).sum(axis=2)
-    nearer = motion[k, i] < motion[k, j] - tol.SAME
+    nearer = motion[k, i] < motion[k, j] - tol.ROUNDING_DISTANCE
     i, j = np.where(nearer, j, i), np.where(nearer, i, j)
     for p in np.argsort(motion[k, i], kind="stable"):
         chosen[k[p], i[p]] &= not chosen[k[p], j[p]]
@@ -130,7 +130,7 @@ def _moves_straight(arm: Arm, task: Task, q: Array, offset: Array, target: Array
     goal = np.concatenate([target[index]] * 3)
     landed, size = newton.correct(arm, task, start.reshape(-1, arm.n), goal, steps=3, least=tol.WEAK)
     deviation = np.abs(newton.difference(arm, landed, start.reshape(-1, arm.n))).max(axis=1)
-    keeps_target = (size <= tol.SOLUTION) & (deviation < 10 * tol.TURNED)
+    keeps_target = (size <= tol.SOLUTION) & (deviation < 10 * tol.STILL_TURN)
     reached[index[keeps_target.reshape(3, -1).all(axis=0)]] = True
     return reached
 
@@ -146,7 +146,7 @@ def _both_ways(arm: Arm, offset: Array) -> Array:
 
 def pull_back(arm: Arm, task: Task, q: Array, target: Array, steps: int = 6) -> tuple[Array, Array]:
     """Postures (M, n) beside a self-motion pulled back onto it, and what they miss: see `newton.correct`."""
-    return newton.correct(arm, task, q, target, steps=steps, least=tol.WEAK, patience=1, stalled=tol.STALLED)
+    return newton.correct(arm, task, q, target, steps=steps, least=tol.WEAK, patience=1, stalled=tol.STALLED_RESIDUAL)
 
 
 def push_along(arm: Arm, task: Task, q: Array, step: Array, push: Array, target: Array) -> tuple[Array, Array, Array]:
@@ -169,11 +169,11 @@ def _equally_long(offsets: Array, push: Array) -> Bool:
 def _moving_joints(offsets: Array, is_motion: Bool) -> Bool:
     """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
 
-    Roots of high order are off by up to 10 `TURNED`, and a short way that is drawn back to a meeting ends anywhere
+    Roots of high order are off by up to 10 `STILL_TURN`, and a short way that is drawn back to a meeting ends anywhere
     nearby: neither is motion of a joint.
     """
     length = np.abs(offsets).max(axis=1)
-    return np.asarray(np.where(is_motion[:, None], length[1] > tol.MOVED * 10 * STEP, length[0] > 10 * tol.TURNED))
+    return np.asarray(np.where(is_motion[:, None], length[1] > tol.MOVED * 10 * STEP, length[0] > 10 * tol.STILL_TURN))
 
 
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
@@ -188,7 +188,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     _, _, growth = push_along(arm, task, q[row], step, push, target[row])
     movable = np.flatnonzero(growth <= tol.GROWTH)
     # The second pass decides this of those that lose one direction and miss by more than rounding, by a longer step.
-    loses_one = ~loses_several[movable] & (growth[movable] * step[movable] > tol.CLOSED)
+    loses_one = ~loses_several[movable] & (growth[movable] * step[movable] > tol.ROUNDING_RESIDUAL)
     if loses_one.any():
         tried = movable[loses_one]
         _, _, growth = push_along(arm, task, q[row[tried]], 10 * step[tried], push[tried], target[row[tried]])
@@ -206,7 +206,7 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     growth = size.max(axis=(1, 2)) - newton.misses(arm, task, q, target)[row]  # (2, m)
     short_holds, long_holds = (growth <= tol.GROWTH * STEPS) & _equally_long(offsets, push)
     # A residual above rounding must stay small up to the long step: a fold's first tenth of a radian shows nothing.
-    is_motion = (short_holds & ((growth[0] <= tol.CLOSED) | long_holds)) | (long_holds & loses_several)
+    is_motion = (short_holds & ((growth[0] <= tol.ROUNDING_RESIDUAL) | long_holds)) | (long_holds & loses_several)
     np.logical_or.at(moving, row, is_motion)
     np.logical_or.at(joints, row, is_motion[:, None] & _moving_joints(offsets, long_holds))
     return moving, joints

@@ -88,7 +88,7 @@ def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
     S, V = np.linalg.svd(J)[1:]
     nullity = arm.n - (S > tol.WEAK).sum(axis=1)
     in_null = np.arange(arm.n) >= arm.n - nullity[:, None]
-    has_motion = (np.where(in_null[:, :, None], np.abs(V), 0.0) > tol.FOLDED).any(axis=1)
+    has_motion = (np.where(in_null[:, :, None], np.abs(V), 0.0) > tol.FOLD_VALUE).any(axis=1)
     return J, np.asarray(~has_motion & (nullity > 1)[:, None])
 
 
@@ -98,7 +98,7 @@ def _about_one_line(J: Array, pair: Pair) -> Bool:
     Where an elbow is stretched they are known to the root of rounding.
     """
     i, j, sense = pair
-    return np.asarray(np.abs(J[:, :, j] - sense * J[:, :, i]).max(axis=1) < tol.FOLDED)
+    return np.asarray(np.abs(J[:, :, j] - sense * J[:, :, i]).max(axis=1) < tol.FOLD_VALUE)
 
 
 def _joint_pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:

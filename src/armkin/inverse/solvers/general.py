@@ -114,7 +114,7 @@ def _with_sixth_joint(chain: Chain, tolerance: float) -> Chain | None:
     the wrist is not singular in the postures that people ask for.
     """
     L = chain.link[4]
-    if chain.prismatic[3:].any() or is_parallel(L, tol.PARALLEL):
+    if chain.prismatic[3:].any() or is_parallel(L, tol.PARALLEL_SINE):
         return None
     meeting = (inverse(L) @ [*perpendicular_foot(L), 1.0])[:3]
     if np.hypot(*meeting[:2]) > tolerance:

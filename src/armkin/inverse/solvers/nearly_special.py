@@ -43,7 +43,7 @@ RINGS = (1.0, 5.0, 25.0)  # factors on the distance from the class, for seeds on
 def _nearest_class(arm: Arm, task: Task) -> tuple[float, Geometry] | None:
     """The class nearest to the arm, of those that would fit if its axes moved by `NEAR_DEFECT`, and its distance."""
     positions, poses = (planar, elbow, three_joints), (spherical, three_parallel)
-    limit = tol.NEARLY_SPECIAL if task.name == "xyz" else NEARLY_PARALLEL
+    limit = tol.COUNTED_DEFECT if task.name == "xyz" else NEARLY_PARALLEL
     classes = [*((module, limit) for module in positions), *((module, tol.NEAR_DEFECT) for module in poses)]
     fitting = [ideal for module, limit in classes if (ideal := module.recognise(arm, task, limit)) is not None]
     return min(((_class_gap(arm, task, ideal), ideal) for ideal in fitting), key=lambda pair: pair[0], default=None)
@@ -56,7 +56,7 @@ def recognise(arm: Arm, task: Task) -> Geometry | None:
         return None
     gap, ideal = nearest
     elimination = cache(lambda: general.recognise(arm, task)) if task.name == "pose" and arm.n == 6 else None
-    healthy = _by_elimination(arm, task, ideal, gap, elimination()) if elimination and gap > tol.BLURRED else None
+    healthy = _by_elimination(arm, task, ideal, gap, elimination()) if elimination and gap > tol.BLUR_DEFECT else None
     if healthy is not None:
         return healthy
 
@@ -142,7 +142,7 @@ def _class_gap(arm: Arm, task: Task, ideal: Geometry) -> float:
     seed, _, _ = recorded_formula(arm, task, ideal).rows(target)
     B = seed.shape[1]
     miss = newton.misses(arm, task, seed.reshape(-1, arm.n), np.repeat(target, B, axis=0)).reshape(-1, B)
-    return float(np.quantile(miss.min(axis=1), 0.8)) + tol.ROUNDED_ANSWER
+    return float(np.quantile(miss.min(axis=1), 0.8)) + tol.NO_RESIDUAL
 
 
 def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | None] | None, target: Array) -> Rows:

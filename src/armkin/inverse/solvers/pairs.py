@@ -176,8 +176,8 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
         half_gap[active] += step[:, n:-1]
         square[active] += step[:, -1]
         size[active] = np.abs(step).max(axis=1)
-        active = active[~(size[active] < tol.PAIR_SETTLED)]
+        active = active[~(size[active] < tol.PAIR_STEP)]
         if not len(active):
             break
     half_gap *= np.sqrt(np.abs(square))[:, None] * unit
-    return _RootPair(middle, half_gap, square, size < tol.PAIR_SETTLED)
+    return _RootPair(middle, half_gap, square, size < tol.PAIR_STEP)

@@ -59,7 +59,7 @@ class PositionPencil:
         self.small, self.tight = float(S[1]), float(S[1] / max(S[0], tol.TINY))
         self.fixed = np.array([position._affine(w, [0.0, 0.0])[:3] for w in self.weights], float)
         self.tip = position.Y / position.scale
-        self.touching = max(tol.DOUBLE_ROOT, tol.BLUR_OF_PAIRS / max(self.tight, tol.NO_SECOND) ** 0.5)
+        self.touching = max(tol.DOUBLE_DISTANCE, tol.BLUR_OF_PAIRS / max(self.tight, tol.NO_SECOND) ** 0.5)
 
     def roots(self, target: Array) -> _Roots:
         """All four roots of targets (N, 3), complex ones by their real parts."""

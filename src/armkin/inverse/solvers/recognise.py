@@ -33,7 +33,7 @@ def solver(arm: Arm, task_name: str | None) -> tuple[Task, Geometry]:
         left = f"leave {surplus} degree{'s' if surplus > 1 else ''} of freedom"
         problem = f"{arm.name}: {arm.n} joints for the {task.constraints} constraints of task {task.name} {left}"
         raise redundant_error(arm, surplus, problem)
-    effective = rank(arm, task, tol.RANK)
+    effective = rank(arm, task, tol.RANK_VALUE)
     if effective < arm.n:  # a self-motion at every target: no list of isolated branches could be complete
         default = default_task(arm)
         problem = (

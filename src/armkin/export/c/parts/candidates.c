@@ -34,7 +34,7 @@ static void arm_candidates(const double *ARM_RESTRICT goal, const double *ARM_RE
         number = arm_merge(one->goal, found, number, &one->edge);
         doubt[lane] = one->open || number > ARM_BRANCHES || (number && !exact) ? 2 : one->edge;
         for (i = 0; i < number; i++)
-            doubt[lane] |= !(found[i].weakness <= ARM_ILL) + 2 * !(found[i].weakness * ARM_DOUBLE <= 1);
+            doubt[lane] |= !(found[i].weakness <= ARM_ILL_INVERSE) + 2 * !(found[i].weakness * ARM_DOUBLE_VALUE <= 1);
         for (i = 0; i < ARM_BRANCHES; i++) {
             for (j = 0; j < ARM_JOINTS; j++) {
                 k = (i * ARM_JOINTS + j) * ARM_LANES + lane;

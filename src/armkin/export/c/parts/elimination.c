@@ -27,7 +27,7 @@ static int arm_may_be_empty(const arm_seed *seed, const double *re, const double
     for (j = 0; j < size && i >= 0; j++) {
         const double a = 1 + re[i] * re[i] + im[i] * im[i], b = 1 + re[j] * re[j] + im[j] * im[j];
         const double x = re[i] - re[j], y = im[i] - im[j];
-        if (j != i && !(4 * (x * x + y * y) > ARM_ALONE * ARM_ALONE * a * b))
+        if (j != i && !(4 * (x * x + y * y) > ARM_LONE_DISTANCE * ARM_LONE_DISTANCE * a * b))
             return 0;
     }
     return 1;
@@ -40,7 +40,7 @@ static int arm_judge(const arm_pencil *pencil, int pass, const arm_seed *seed, c
 {
     const double shake = arm_shakes[pass];
     const int careful = pass > 0, joint = pencil->order[2 + pencil->hidden], begin = *count;
-    const double pair = ARM_PAIRED + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
+    const double pair = ARM_PAIRED_PART + 10 * sqrt(shake); /* tilt below which a complex root may be one of two real ones */
     double weakest = 0, hidden[ARM_MOST];
     unsigned char own[ARM_MOST], stands[ARM_MOST], blurred[ARM_MOST], real[ARM_MOST];
     int i, j, k, open = 0;
@@ -52,7 +52,7 @@ static int arm_judge(const arm_pencil *pencil, int pass, const arm_seed *seed, c
         hidden[*count - begin] = seed[i].q[joint];
         good = one->residual < (careful ? ARM_GRAZING : ARM_ELIMINATED);
         if (!good && (tilt < ARM_UPRIGHT || (careful ? one->residual < ARM_CLOSE_RESIDUAL
-                    && tilt < (pair > ARM_STRAY ? pair : ARM_STRAY) : one->residual < ARM_STRAY)))
+                    && tilt < (pair > ARM_STRAY_DISTANCE ? pair : ARM_STRAY_DISTANCE) : one->residual < ARM_STRAY_DISTANCE)))
             open = 1; /* a complex pair that steps brought near the pose may be a real one, seen through rounding */
         if (good && tilt > 0 && tilt < pair)
             open = 1; /* a move of the pose may turn two close real roots into such a pair */
@@ -74,7 +74,7 @@ static int arm_judge(const arm_pencil *pencil, int pass, const arm_seed *seed, c
        Near singularities roots are too far off to say so. */
     for (j = begin; j < *count; j++) {
         own[j - begin] &= !(shake > 0) && weakest < ARM_REGULAR;
-        if (real[j - begin] && found[j].guess > ARM_STRAY + 30 * shake && !own[j - begin])
+        if (real[j - begin] && found[j].guess > ARM_STRAY_DISTANCE + 30 * shake && !own[j - begin])
             open = 1;
     }
     /* Two roots that share the hidden joint: good if both were near an answer at once, and, of real ones, if these are not
@@ -86,7 +86,7 @@ static int arm_judge(const arm_pencil *pencil, int pass, const arm_seed *seed, c
                 && fabs(hidden[one] - hidden[other]) < ARM_SAME_ROOT)
                 open = 1;
             if (real[one] && real[other] && fabs(found[j].key - found[k].key) < ARM_SAME_KEY
-                && arm_apart(found[j].q, found[k].q) < ARM_EXAMINED)
+                && arm_apart(found[j].q, found[k].q) < ARM_EXAMINED_DISTANCE)
                 open = 1;
         }
     return open;
@@ -155,7 +155,7 @@ static int arm_attempt(const double *goal, int kind, int pass, arm_answer *found
     for (i = 0; i < seeds; i++) {
         double frame[12], joints[72], error[6];
         if (!(arm_shakes[pass] > 0) && of.most < ARM_STEADY && arm_may_be_empty(seed + i, of.re, of.im, pencil->size)
-            && arm_missing(seed[i].q, goal, frame, joints, error) > ARM_STRAY)
+            && arm_missing(seed[i].q, goal, frame, joints, error) > ARM_STRAY_DISTANCE)
             continue;
         seed[kept] = seed[i];
         for (k = 0; k < 6; k++)
@@ -188,7 +188,7 @@ static int arm_merge(const double *goal, arm_answer *found, int count, int *merg
                 half[k] = found[i].q[k] + step[k] / 2;
                 distance = fabs(step[k]) > distance ? fabs(step[k]) : distance;
             }
-            if (!(distance < ARM_EXAMINED))
+            if (!(distance < ARM_EXAMINED_DISTANCE))
                 continue;
             blur = 4 * (found[i].residual > found[j].residual ? found[i].residual : found[j].residual);
             radius = 3 * found[i].weakness * found[i].residual;

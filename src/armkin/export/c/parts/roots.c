@@ -145,7 +145,7 @@ static int arm_joints_from(const arm_pencil *pencil, const double *v, const doub
         middle[third] = atan2(sign * v[3 * row + 2], sign * v[3 * row + 1]);
     }
     for (i = 0; i < 3; i++)
-        if (!(fabs(middle[i]) < ARM_INFINITE))
+        if (!(fabs(middle[i]) < ARM_INFINITE_SLIDE))
             return 0;
     for (i = 0; i < 8; i++)
         part[i] = i < 3 ? middle[i] : 0;
