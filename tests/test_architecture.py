@@ -58,12 +58,12 @@ MAY_IMPORT: dict[str, str] = {
     " motion/branches motion",
     "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
     " inverse inverse/answers inverse/solvers inverse/tasks motion motion/plan motion/path_planner path_file",
-    "export": "errors formula robot_file model forward inverse/tasks view",
+    "export": "errors formula robot_file model forward inverse/tasks inverse/numeric inverse/elimination view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
-    "export/c": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
+    "export/c": "export keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/closed inverse/elimination inverse/branches inverse/solvers",
     "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
-    " inverse/elimination inverse/branches keep_out motors export/c",
+    " inverse/elimination inverse/branches keep_out motors export export/c",
     "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
     " inverse/redundant user_folders",

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.export.c.source_parts import part_text
+from armkin.export.elimination_data import frame_rows, is_read, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
-from armkin.inverse.elimination.choose_variable import Kind
-from armkin.inverse.elimination.merge import MAX_ANSWERS, weights
+from armkin.inverse.elimination.merge import weights
 from armkin.inverse.elimination.method import Elimination
-from armkin.inverse.elimination.passes import REGULAR, TILT, shaken_goal
+from armkin.inverse.elimination.passes import REGULAR, TILT
 from armkin.inverse.elimination.roots import STEADY_ENTRY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
@@ -26,7 +26,6 @@ from armkin.inverse.solvers.redundancy import move_entries
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
-    from armkin.formula.arrays import Array
     from armkin.inverse.elimination.closed_loop import Loop
     from armkin.inverse.elimination.pencil import Pencil
     from armkin.inverse.solvers.redundancy import Redundancy
@@ -43,34 +42,13 @@ _NAMED = {  # numbers of the method, by their names in Python
         "SAME_ROOT", "STRAY_DISTANCE", "TWIN_ROOTS", "UPRIGHT",
     )
 }  # fmt: skip
-BRANCHES = MAX_ANSWERS
 ACCEPTED = 1e-18  # bound of the squared residual of answers of the C code
-OWN_PENCILS = 2  # special pencils of each kind of poses
 PASSES = 4  # passes of the C code, of seven in Python; unsolved cases are reported as doubt
 
 
 def has_form(elimination: Elimination) -> bool:
     """Whether C can read all pencils for general poses."""
-    return bool(elimination.plans) and all(map(_is_read, elimination.plans[:PASSES]))
-
-
-def _is_read(pencil: Pencil) -> bool:
-    """Whether a pencil has the pose where parts/roots.c expects it: in La, Lb or Le, at full rank."""
-    return pencil.role.slot == 1 or (pencil.role.at_an_end and pencil.ends.rank == 9)
-
-
-def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
-    """The pencils for each kind of poses; the first two are special for the kind, if C can read them."""
-    special_pencils = [elimination.pencils_of_kind(kind)[:OWN_PENCILS] for kind in Kind]
-    usual = elimination.plans[:passes]
-    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in special_pencils]
-
-
-def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:
-    """The distinct pencils of plans, and the plans as indices of pencils."""
-    distinct = {(pencil.role, pencil.psi): pencil for plans in kinds for pencil in plans}
-    numbers = {key: number for number, key in enumerate(distinct)}
-    return list(distinct.values()), [[numbers[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
+    return bool(elimination.plans) and all(map(is_read, elimination.plans[:PASSES]))
 
 
 def candidates_code(
@@ -147,28 +125,6 @@ def _array_sizes(pencils: list[Pencil], passes: int) -> dict[str, int]:
     }
 
 
-def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:
-    """The arrays of a pencil, with rows of 15 padded to 16; None for arrays that its slot does not have."""
-    slot, ends = pencil.role.slot, pencil.ends
-    return {
-        "links": np.concatenate([frame_rows(link) for link in pencil.links]),
-        "first": _first_factor(slot, ends.factors) if slot != 1 else None,
-        "second": _pad_to_fours(ends.factors[1]) if slot == 0 else None,
-        "N": _pad_to_fours(ends.N) if slot == 1 else None,
-        "recover": _pad_to_fours(ends.recover) if slot == 1 else None,
-        "columns": pencil.columns,
-        "mix": pencil.mix,
-        "K_re": pencil.K_re if pencil.K_re.size else None,
-        "K_im": pencil.K_im if pencil.K_re.size else None,
-        "W": pencil.W,
-    }
-
-
-def moves_of(passes: int) -> list[Array]:
-    """The motion of the pose in each pass, as frames."""
-    return [frame_rows(shaken_goal(np.eye(4), shake)) for shake in SHAKES[:passes]]
-
-
 def _pencil_code(number: int, pencil: Pencil) -> str:
     """The arrays of a pencil, and the macro that initialises its struct."""
     slot, ends, arrays = pencil.role.slot, pencil.ends, pencil_arrays(pencil)
@@ -184,19 +140,6 @@ def _pencil_code(number: int, pencil: Pencil) -> str:
         *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),
     ]
     return "\n".join([*texts, f"#define ARM_PENCIL_{number} {{{', '.join(fields)}}}", ""])
-
-
-def _first_factor(slot: int, factors: tuple[Array, ...]) -> Array:
-    """The first factor of Q with transposed matrices: (3, 15, 16) in slot La, (15, 9 * 16) in slot Le."""
-    matrices = factors[0].reshape(-1, 15, 15)
-    if slot == 0:
-        return _pad_to_fours(matrices.swapaxes(1, 2))
-    return _pad_to_fours(np.moveaxis(matrices, 2, 0)).reshape(15, -1)
-
-
-def _pad_to_fours(rows: Array) -> Array:
-    """Rows (..., k) padded with zeros to a multiple of four."""
-    return np.pad(rows, [(0, 0)] * (rows.ndim - 1) + [(0, -rows.shape[-1] % 4)])
 
 
 def _with_virtual_joint() -> str:
@@ -218,11 +161,6 @@ def _with_held_joint(arm: Arm, held: Redundancy) -> str:
     lines = [*code.lines, *(f"others[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
     text = part_text("held_joint").replace("@lines@", "\n        ".join(lines))
     return text.replace("@held@", str(held.joint)).replace("@others@", str(arm.n - 1)).replace("@goal@", str(size))
-
-
-def frame_rows(motion: ArrayLike) -> np.ndarray:
-    """The upper three rows of a motion (4, 4), as a flat array."""
-    return np.asarray(motion, dtype=float)[:3].ravel()
 
 
 def _array_code(name: str, values: ArrayLike) -> str:

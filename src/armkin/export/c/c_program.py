@@ -14,6 +14,7 @@ from armkin.export.c.source_parts import part_text
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.branches.names import branch_names
+from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.numeric.tolerances import CLOSE_DISTANCE, DECIMAL, FLOAT32
 from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
@@ -156,9 +157,7 @@ def candidates_code(
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return c_elimination.candidates_code(
-        arm, task, geometry.elimination, lanes=lanes, held=held
-    ), c_elimination.BRANCHES
+    return c_elimination.candidates_code(arm, task, geometry.elimination, lanes=lanes, held=held), MAX_ANSWERS
 
 
 def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:

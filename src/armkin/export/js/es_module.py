@@ -19,6 +19,7 @@ from armkin.export.c.keep_out_tables import pair_tables
 from armkin.export.js import js_elimination
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
+from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import redundancy
 from armkin.keep_out.bodies import ends_formula
@@ -124,7 +125,7 @@ def part_text(name: str) -> str:
 def candidates_code(arm: Arm, task: Task, geometry: Geometry) -> tuple[str, int]:
     """The function `candidates` for the class of an arm, and its number of branches."""
     if geometry.pairs is None:
-        return js_elimination.elimination_code(arm, task, geometry.elimination), js_elimination.BRANCHES
+        return js_elimination.elimination_code(arm, task, geometry.elimination), MAX_ANSWERS
     goal = {f"g{k}": f"goal[{k}]" for k in range(arm_formulas.goal_size(task))}
     recorded = arm_formulas.record_candidates(arm, task, geometry, measured=True)
     code = c_and_js_code.write_code(recorded, [*goal, *_preferred_inputs(arm)], c_and_js_code.JAVASCRIPT)

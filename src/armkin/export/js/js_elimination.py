@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.export.c.c_elimination import BRANCHES, frame_rows, moves_of, pencil_arrays, pencils_of, plans_of
+from armkin.export.elimination_data import frame_rows, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.elimination.merge import weights
 from armkin.inverse.elimination.method import Elimination
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-__all__ = ["BRANCHES", "METHOD", "elimination_code"]
+__all__ = ["METHOD", "elimination_code"]
 METHOD = ("eigenvalues", "frames", "roots", "equal_roots", "elimination")
 
 
