@@ -32,7 +32,7 @@ class Axes:
         """The active configuration."""
         return self._setup.image
 
-    def settle(self, steps: list[int]) -> None:
+    def add_steps(self, steps: list[int]) -> None:
         """Add completed steps."""
         self.base = [b + m for b, m in zip(self.base, steps, strict=True)]
         self.net = [b + m for b, m in zip(self.net, steps, strict=True)]

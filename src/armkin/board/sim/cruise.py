@@ -43,7 +43,7 @@ class Cruise:
         total = [d + r * mean_time for d, r in zip(self._done, self.rate, strict=True)]
         steps = [int(t) - int(d) for t, d in zip(total, self._done, strict=True)]
         self._done = total
-        self.axes.settle(steps)
+        self.axes.add_steps(steps)
 
     def clear(self) -> bool:
         """Whether the arm stays within its limits if it brakes after the next millisecond."""

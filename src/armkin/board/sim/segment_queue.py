@@ -106,7 +106,7 @@ class Queue:
             places = [
                 f + finished.segment.ticks * r for f, r in zip(self._fraction, finished.segment.rates, strict=True)
             ]
-            self.axes.settle([p >> 23 for p in places])
+            self.axes.add_steps([p >> 23 for p in places])
             self._fraction = [HALF if finished.end else p % STEP for p in places]
             cycles_left = self._cycles_run - finished.times[-1]
             self.begin()

@@ -89,7 +89,7 @@ class Motors:
 
     def cut(self) -> None:
         """Stop dead, as a reset does."""
-        self.axes.settle(self.queue.steps_made())
+        self.axes.add_steps(self.queue.steps_made())
         self._stop_at_rest()
 
     def advance(self, seconds: float) -> None:

@@ -39,7 +39,7 @@ def link_branches(
     """
     work = _Linking(arm=arm, targets=targets, task=task, tolerance=tolerance, near=near, length=float(s[-1]))
     work.start(s)
-    work.settle()
+    work.divide_unlinked_steps()
     return work.columns
 
 
@@ -77,7 +77,7 @@ class _Linking:
         self.crossing = np.zeros(N - 1, bool)  # steps in which a joint passes a limit
         self._link()
 
-    def settle(self) -> None:
+    def divide_unlinked_steps(self) -> None:
         """Divide the unlinked steps in a small table of their own, with three samples around each."""
         columns = self.columns
         steps = np.flatnonzero(self.torn | self.crossing)
