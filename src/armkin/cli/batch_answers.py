@@ -12,7 +12,7 @@ from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__, files
 from armkin.cli import output
-from armkin.cli.batch_pieces import Piece, Rows, parse_piece
+from armkin.cli.batch_pieces import InputRows, Piece, parse_piece
 from armkin.cli.render import to_json
 from armkin.cli.row_chunks import Chunk
 from armkin.columns.csv_cells import csv_line
@@ -190,7 +190,7 @@ class BatchRun:
         """The engine for the work."""
         return Engine(self.workers, self.cluster)
 
-    def run(self, pieces: Rows) -> Tally:
+    def run(self, pieces: InputRows) -> Tally:
         """Answer all pieces."""
         to_file = self.out is not None and self.out != "-"
         file_format = format_of(self.out if to_file else None)
@@ -210,7 +210,7 @@ class BatchRun:
             output.warn(f"{tally.skipped} row{'s' * (tally.skipped > 1)} without {names} skipped")
         return tally
 
-    def _stream(self, file_format: Format, job: Job, pieces: Rows, tally: Tally) -> None:
+    def _stream(self, file_format: Format, job: Job, pieces: InputRows, tally: Tally) -> None:
         """Write to a pipe piece by piece, or a binary format at the end."""
         binary_parts: list[bytes] = []
         with _binary_writer(self.out) as write, output.progress("rows", pieces.count) as tick:
@@ -266,7 +266,7 @@ class _ToFile:
         self.first: Done | None = None  # the only piece so far: it may be the last
         self.count = 0
 
-    def run(self, pieces: Rows) -> None:
+    def run(self, pieces: InputRows) -> None:
         """Answer what is missing, and make the file."""
         if not self.batch.resume:
             self.parts.refuse_begun()

@@ -39,7 +39,7 @@ class Piece(NamedTuple):
         return hashlib.sha256(content).hexdigest()
 
 
-class Rows:
+class InputRows:
     """The rows of a file, of standard input ("-") or of a list, in pieces."""
 
     def __init__(

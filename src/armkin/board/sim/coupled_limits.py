@@ -7,8 +7,8 @@ from armkin.board.sim.axis_counts import row_value
 from armkin.board.sim.frame_fields import RefusedError
 
 
-class Rows:
-    """The rows of a configuration during one motion."""
+class CoupledLimits:
+    """The limits of a configuration's coupled joints during one motion."""
 
     def __init__(self, image: Image, counts: list[int]) -> None:
         self._image = image

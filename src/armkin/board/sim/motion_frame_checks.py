@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from armkin.board.firmware.wire.protocol import STEP, Error, Segment
 from armkin.board.sim.axis_counts import limit_rule_holds
-from armkin.board.sim.coupled_limits import Rows
+from armkin.board.sim.coupled_limits import CoupledLimits
 from armkin.board.sim.frame_fields import MotionFields, RefusedError
 from armkin.board.sim.host_settings import Setup
 from armkin.board.sim.rate_checks import Velocity, times_valid
@@ -21,7 +21,7 @@ class Batches:
     def begin(self) -> None:
         """Begin a motion at rest at the end of the queue."""
         self._velocity = Velocity(self._setup.board, self._setup.image)
-        self._rows = Rows(self._setup.image, self._queue.plan_counts())
+        self._coupled_limits = CoupledLimits(self._setup.image, self._queue.plan_counts())
 
     def check(self, batch: MotionFields, known_axes: int) -> list[Segment]:
         """The batch's segments with a rate for every axis; RefusedError if one of them must not run."""
@@ -57,5 +57,5 @@ class Batches:
             image, end_count = self._setup.image.axes[axis], plan[axis] >> 23
             if axis in rate_of and not limit_rule_holds(image.lower, image.upper, start_counts[axis], end_count):
                 raise RefusedError(Error.LIMIT, axis)
-        self._rows.check([p >> 23 for p in plan], known_axes)
+        self._coupled_limits.check([p >> 23 for p in plan], known_axes)
         return replace(s, rates=tuple(rates))

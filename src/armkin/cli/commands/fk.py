@@ -62,9 +62,9 @@ def fk(
             render.warn_of_limits(arm, answer["violations"], answer)
             return
     from armkin.cli.batch_answers import BatchRun
-    from armkin.cli.batch_pieces import Rows
+    from armkin.cli.batch_pieces import InputRows
 
-    rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
+    rows = InputRows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {
         "command": "fk",
         "robot file": arm.sha256,

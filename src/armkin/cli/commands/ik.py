@@ -107,10 +107,10 @@ def ik(
     questions = IkQuestions(request, chosen_task, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
         from armkin.cli.batch_answers import BatchRun
-        from armkin.cli.batch_pieces import Rows
+        from armkin.cli.batch_pieces import InputRows
 
         arguments.no_numbers(target)
-        rows = Rows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])
+        rows = InputRows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
         BatchRun(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return

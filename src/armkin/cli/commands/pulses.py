@@ -63,9 +63,9 @@ def pulses(
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
     from armkin.cli.batch_answers import BatchRun
-    from armkin.cli.batch_pieces import Rows
+    from armkin.cli.batch_pieces import InputRows
 
-    rows = Rows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
+    rows = InputRows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}
     questions = PulseQuestions(arm, origin, best)
     batch_run = BatchRun(

@@ -17,7 +17,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.motion.tool_path.b_spline import Layout
 from armkin.motion.tool_path.chords import CORNER_ANGLE, Chords, turn_angles
-from armkin.motion.tool_path.least_knots import Rows, least_knots
+from armkin.motion.tool_path.least_knots import FitRows, least_knots
 
 REVERSAL_ANGLE = np.deg2rad(160.0)  # a corner that turns more than this [rad] is a stop
 _CORNER_DISTANCES = (4.0, 16.0)  # distances [tolerances] over which a corner is confirmed
@@ -138,7 +138,7 @@ def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[_Cubics, 
     begin, end, powers = u[:-1][is_line], u[1:][is_line], line_powers
     is_curve = used & ~is_line
     if is_curve.any():
-        rows = Rows.from_chords(chords, is_curve, tolerance)
+        rows = FitRows.from_chords(chords, is_curve, tolerance)
         layout, control, misses = least_knots(rows)
         too_far = misses > 1.0
         missed[rows.point[too_far & (rows.point >= 0)]] = True

@@ -23,7 +23,7 @@ _HOPELESS_MISFIT = 2.5  # A misfit of so many tolerances needs a division, as we
 
 
 @dataclass(frozen=True)
-class Rows:
+class FitRows:
     """The R rows of the fit: given points, and places on the chords between them."""
 
     u: Array  # (R,)
@@ -39,7 +39,7 @@ class Rows:
     ends: Bool  # (R,) ends of curves
 
     @staticmethod
-    def from_chords(chords: Chords, used: Bool, tolerance: float) -> Rows:
+    def from_chords(chords: Chords, used: Bool, tolerance: float) -> FitRows:
         """Rows of the chords that are used: (N - 1,)."""
         numbers, share, row_weight = _places_on_chords(chords, used)
         u = chords.u[numbers] + share * chords.length[numbers]
@@ -52,7 +52,7 @@ class Rows:
         _, curve = np.unique(chords.curve[numbers], return_inverse=True)
         starts = np.append(True, curve[1:] != curve[:-1])
         direction = np.where(is_point[:, None], 0.0, chords.step[numbers] / chords.length[numbers, None])
-        return Rows(
+        return FitRows(
             u=u,
             y=np.asfortranarray(chords.y[numbers] + share[:, None] * chords.step[numbers]),
             curve=curve,
@@ -66,11 +66,11 @@ class Rows:
             ends=starts | np.append(starts[1:], True),
         )
 
-    def part(self, curves: Int) -> Rows:
+    def part(self, curves: Int) -> FitRows:
         """All rows of some curves."""
         taken = {field.name: getattr(self, field.name).T.take(curves, axis=-1).T for field in fields(self)}
         taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
-        return Rows(**taken)
+        return FitRows(**taken)
 
     def miss(self, values: Array) -> Array:
         """The differences between curve points `values` (R, d) and the rows, across the curve or the chord: (R, d)."""
@@ -122,7 +122,7 @@ def _graded_places(chords: Chords, used: Bool) -> tuple[Int, Array]:
     return np.concatenate(numbers), np.concatenate(places)
 
 
-def least_knots(rows: Rows) -> tuple[Layout, Array, Array]:
+def least_knots(rows: FitRows) -> tuple[Layout, Array, Array]:
     """Splines with few knots through rows: layout, control points, and misfits in tolerances (R,)."""
     first = np.flatnonzero(np.append(True, rows.curve[1:] != rows.curve[:-1]))
     row_in_curve = np.arange(len(rows.u)) - first[rows.curve]
@@ -164,7 +164,7 @@ class _Progress(NamedTuple):
         return _Progress(self.knot[index], self.weight[index], self.rounds[index])
 
 
-def _refine_intervals(rows: Rows, layout: Layout, misses: Array, astray: Bool, progress: _Progress) -> None:
+def _refine_intervals(rows: FitRows, layout: Layout, misses: Array, astray: Bool, progress: _Progress) -> None:
     """Divide intervals that miss their rows, or raise the weights of those rows: changes `progress` in place."""
     (knot, weight, rounds), too_far = progress, misses > 1.0
     worst = np.zeros(len(layout.begin))
@@ -184,7 +184,7 @@ def _refine_intervals(rows: Rows, layout: Layout, misses: Array, astray: Bool, p
     weight[raised] = np.minimum(np.maximum(weight[raised], 0.05) * (1.4 * misses[raised]) ** 2, _MAX_WEIGHT)
 
 
-def _astray_intervals(rows: Rows, layout: Layout, miss: Array, weight: Array) -> Bool:
+def _astray_intervals(rows: FitRows, layout: Layout, miss: Array, weight: Array) -> Bool:
     """Which intervals miss their points systematically, with neighbours on the same side: (M,)."""
     points = np.flatnonzero(rows.point >= 0)
     a, b = points[:-1], points[1:]
