@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.compiled import c_source, elimination_rows, toolchain
+from armkin.compiled import c_source, toolchain
 from armkin.compiled.batch_results import Results
+from armkin.compiled.elimination_rows import CompiledElimination
 from armkin.compiled.joint_functions import THREAD_POSES, JointFunctions
 from armkin.compiled.one_target import Single
 from armkin.errors import UsageError
@@ -193,10 +194,10 @@ class _CompiledTask:
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 7], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
         self._single = self._single_solver(code.arm_single)
-        self._in_c: elimination_rows.InC | None = None
+        self._elimination: CompiledElimination | None = None
         if form is not None and c_source.has_rows(self.task, form):
             code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
-            self._in_c = elimination_rows.InC(self.geometry, form, code.arm_rows, self.branches, self.n)
+            self._elimination = CompiledElimination(self.geometry, form, code.arm_rows, self.branches, self.n)
 
     def ik(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None = None
@@ -336,8 +337,9 @@ class _CompiledTask:
         self, batch: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
     ) -> None:
         """Solve some targets in Python and write their results; near: (1, n) or (N, n)."""
-        sure = np.zeros(len(rows), bool) if self._in_c is None else self._in_c.settles(target[rows])
-        for part, geometry in ((rows[sure], self._in_c and self._in_c.geometry), (rows[~sure], self.geometry)):
+        elimination = self._elimination
+        in_c = np.zeros(len(rows), bool) if elimination is None else elimination.is_complete(target[rows])
+        for part, geometry in ((rows[in_c], elimination and elimination.geometry), (rows[~in_c], self.geometry)):
             if len(part) and geometry:
                 close, of_rows = near[part] if len(near) > 1 else near[0], None if rounding is None else rounding[part]
                 batch.write(part, solve.solve_by(self.arm, self.task, geometry, target[part], close, rounding=of_rows))

@@ -19,24 +19,24 @@ from armkin.inverse.solvers.nearly_special import name_branches
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
 
-SETTLED = 2  # states of `arm_rows` below this mean complete, isolated branches; see export/c/parts/candidates.c
+UNSURE_STATE = 2  # least state of `arm_rows` whose branches may lack one or be double: export/c/parts/candidates.c
 
 
-class InC:
-    """A class whose rows come from `arm_rows` of parts/elimination_rows.c, and unsettled ones from Python."""
+class CompiledElimination:
+    """A geometry whose rows come from `arm_rows` of parts/elimination_rows.c, and unsure ones from Python."""
 
     def __init__(
-        self, geometry: Geometry, unnamed: Geometry, call: Callable[..., Any], branches: int, joints: int
+        self, geometry: Geometry, without_names: Geometry, call: Callable[..., Any], branches: int, joints: int
     ) -> None:
-        """unnamed: the elimination without names; branches, joints: the size of a row in C."""
-        self._complete, self._slow = unnamed.complete, geometry.unmoved or unnamed.rows
+        """without_names: the elimination without names; branches, joints: the size of a row in C."""
+        self._complete, self._slow = without_names.complete, geometry.unmoved or without_names.rows
         self._call, self._shape = call, (branches, joints)
         rows = name_branches(self._rows, geometry) if geometry.places else self._rows
         self.geometry = replace(geometry, rows=rows, unmoved=None)
 
-    def settles(self, target: Array) -> Bool:
+    def is_complete(self, target: Array) -> Bool:
         """Which targets (N, 4, 4) have complete and isolated branches in C: (N,)."""
-        return np.asarray(self._call_c(target)[1] < SETTLED)
+        return np.asarray(self._call_c(target)[1] < UNSURE_STATE)
 
     def _call_c(self, target: Array) -> tuple[Array, NDArray[np.uint8]]:
         """Branches (N, B, n) of targets, nan after the last, and the states (N,) of the targets."""
@@ -50,14 +50,15 @@ class InC:
         q, states = self._call_c(target)
         doubt, lost, complete = states > 0, np.zeros(N, bool), np.full(N, self._complete)
         guesses = np.empty((N, 0, n))
-        if len(unsettled := np.flatnonzero(states >= SETTLED)):
+        if len(unsure_rows := np.flatnonzero(states >= UNSURE_STATE)):
             assert self._slow is not None
-            slow_rows = self._slow(target[unsettled])
+            slow_rows = self._slow(target[unsure_rows])
             assert slow_rows.lost is not None
             assert slow_rows.guesses is not None
             guesses = np.full((N, slow_rows.guesses.shape[1], n), np.nan)
-            q[unsettled] = np.nan
-            q[unsettled, : slow_rows.q.shape[1]], guesses[unsettled] = slow_rows.q, slow_rows.guesses
-            doubt[unsettled], lost[unsettled], complete[unsettled] = slow_rows.doubt, slow_rows.lost, slow_rows.complete
+            q[unsure_rows] = np.nan
+            q[unsure_rows, : slow_rows.q.shape[1]], guesses[unsure_rows] = slow_rows.q, slow_rows.guesses
+            doubt[unsure_rows], lost[unsure_rows] = slow_rows.doubt, slow_rows.lost
+            complete[unsure_rows] = slow_rows.complete
         width = int((~np.isnan(q[:, :, 0])).sum(axis=1).max(initial=0))
         return Rows(q[:, :width], doubt, complete, lost, guesses)
