@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from armkin.board.firmware.wire.protocol import STEP, Error, Segment
+from armkin.board.firmware.wire.protocol import STEP, Error, Segment, count_at
 from armkin.board.sim.axis_counts import limit_rule_holds
 from armkin.board.sim.coupled_limits import CoupledLimits
 from armkin.board.sim.frame_fields import MotionFields, RefusedError
@@ -25,37 +25,38 @@ class Batches:
 
     def check(self, batch: MotionFields, known_axes: int) -> list[Segment]:
         """The batch's segments with a rate for every axis; RefusedError if one of them must not run."""
-        plan, speed = list(self._queue.plan), self._velocity.copy()
+        plan, velocity = list(self._queue.plan), self._velocity.copy()
         segments = [
-            self._check_segment(i, s, batch.axes, plan, speed, known_axes) for i, s in enumerate(batch.segments)
+            self._check_segment(number, segment, batch.axes, plan, velocity, known_axes)
+            for number, segment in enumerate(batch.segments)
         ]
         ends = dict(zip(batch.axes, batch.end, strict=True))
         for axis in range(len(plan)):
             if batch.at_rest:
-                speed.check_rest(axis)
-            if axis in ends and plan[axis] >> 23 != ends[axis]:
+                velocity.check_rest(axis)
+            if axis in ends and count_at(plan[axis]) != ends[axis]:
                 raise RefusedError(Error.END, axis)
-        self._velocity = Velocity(self._setup.board, self._setup.image) if batch.at_rest else speed
+        self._velocity = Velocity(self._setup.board, self._setup.image) if batch.at_rest else velocity
         return segments
 
     def _check_segment(
-        self, number: int, s: Segment, axes: list[int], plan: list[int], speed: Velocity, known_axes: int
+        self, number: int, segment: Segment, axes: list[int], plan: list[int], velocity: Velocity, known_axes: int
     ) -> Segment:
         """A batch's segment with a rate for every axis; moves `plan` to its end."""
-        if not times_valid(s, self._setup.board.min_interval):
+        if not times_valid(segment, self._setup.board.min_interval):
             raise RefusedError(Error.INTERVAL, number)
-        rates, start_counts = [0] * len(plan), [p >> 23 for p in plan]
-        rate_of = dict(zip(axes, s.rates, strict=True))
-        speed.begin(s)
+        rates, start_counts = [0] * len(plan), [count_at(place) for place in plan]
+        rate_of = dict(zip(axes, segment.rates, strict=True))
+        velocity.begin(segment)
         for axis in range(len(plan)):
             rate = rate_of.get(axis, 0)
             if rate == -STEP:
                 raise RefusedError(Error.STEPS, axis)
-            speed.check(axis, rate)
+            velocity.check(axis, rate)
             rates[axis] = rate
-            plan[axis] += s.ticks * rate
-            image, end_count = self._setup.image.axes[axis], plan[axis] >> 23
+            plan[axis] += segment.ticks * rate
+            image, end_count = self._setup.image.axes[axis], count_at(plan[axis])
             if axis in rate_of and not limit_rule_holds(image.lower, image.upper, start_counts[axis], end_count):
                 raise RefusedError(Error.LIMIT, axis)
-        self._coupled_limits.check([p >> 23 for p in plan], known_axes)
-        return replace(s, rates=tuple(rates))
+        self._coupled_limits.check([count_at(place) for place in plan], known_axes)
+        return replace(segment, rates=tuple(rates))

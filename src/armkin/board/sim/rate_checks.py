@@ -12,20 +12,21 @@ _MAX_UINT16 = 0xFFFF
 _MAX_CHANGE = 1 << 23  # budget of a window from which on the acceleration is not checked
 
 
-def times_valid(s: Segment, min_interval: int) -> bool:
+def times_valid(segment: Segment, min_interval: int) -> bool:
     """Whether all intervals of a segment, and the one after its end, are within `min_interval` and 65535 cycles.
 
     The least interval of a quick segment is 5/4 of `min_interval`.
     """
-    min_interval += min_interval // 4 if s.quick else 0
-    if s.ticks == 0 or s.interval < min_interval or (s.bend and s.ticks > 1 << (10 if s.quick else 14)):
+    min_interval += min_interval // 4 if segment.quick else 0
+    max_ticks = 1 << (10 if segment.quick else 14)  # of a segment with a bend
+    if segment.ticks == 0 or segment.interval < min_interval or (segment.bend and segment.ticks > max_ticks):
         return False
-    turns = s.add * s.last_add < 0 if s.add else s.bend != 0
+    turns = segment.add * segment.last_add < 0 if segment.add else segment.bend != 0
     return (
         not turns
-        and abs(s.last_add + 0.5) < 1 << 23
-        and min_interval <= s.last_interval <= 65535
-        and s.interval_after(s.ticks) <= 65535
+        and abs(segment.last_add + 0.5) < 1 << 23
+        and min_interval <= segment.last_interval <= 65535
+        and segment.interval_after(segment.ticks) <= 65535
     )
 
 
@@ -65,16 +66,16 @@ class Velocity:
         twin._last_pace, twin._pace = self._last_pace, self._pace
         return twin
 
-    def begin(self, s: Segment) -> None:
+    def begin(self, segment: Segment) -> None:
         """Begin a segment whose intervals have been checked."""
         part = self.board.clock // 20
-        cycles, time, windows = s.ticks * ((s.interval + s.last_interval) >> 1), _MAX_UINT16, 0
+        cycles, time, windows = segment.ticks * ((segment.interval + segment.last_interval) >> 1), _MAX_UINT16, 0
         if cycles < part:
             time = (cycles >> 4) * ((1 << 35) // part) >> 15
         else:
             window = (1 << 32) // part
             windows = min(((cycles >> 16) * window >> 8) + ((cycles >> 8 & 255) * window >> 16), _MAX_UINT16)
-        pace = Pace((1 << self._bits) // s.interval, (1 << self._bits) // s.last_interval, time, windows)
+        pace = Pace((1 << self._bits) // segment.interval, (1 << self._bits) // segment.last_interval, time, windows)
         self._last_pace, self._pace = self._pace if self._pace.time else Pace(time=time), pace
 
     def check(self, axis: int, rate: int) -> None:

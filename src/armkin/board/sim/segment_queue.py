@@ -6,22 +6,28 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate
 
-from armkin.board.firmware.wire.protocol import HALF, STEP, Segment
+from armkin.board.firmware.wire.protocol import HALF, STEP, Segment, count_at
 from armkin.board.sim.axis_counts import Axes
 
 _TOO_FAST = 0.030  # shortest time [s] to a stop at which an abrupt stop loses steps
 _SLOW_STOP = 0.024  # longest time [s] to a stop at which the arm may stop at the queue's end
 
 
-def intervals(s: Segment) -> Iterator[int]:
+def intervals(segment: Segment) -> Iterator[int]:
     """Cycles before every tick, as the device adds them up."""
-    interval, add = s.interval << 16, s.add * 256
-    change, block = s.growth
-    for tick in range(1, s.ticks + 1):
+    interval, add = segment.interval << 16, segment.add * 256
+    change, block = segment.growth
+    for tick in range(1, segment.ticks + 1):
         yield interval >> 16
         interval += add >> 8
-        if (s.ticks - tick) % block == 0:
+        if (segment.ticks - tick) % block == 0:
             add += change
+
+
+def _places_after(segment: Segment, places: list[int], ticks: int | None = None) -> list[int]:
+    """Places [2^-23 step] after a segment that begins at `places`, or after its first ticks."""
+    ticks = segment.ticks if ticks is None else ticks
+    return [place + ticks * rate for place, rate in zip(places, segment.rates, strict=True)]
 
 
 @dataclass
@@ -34,8 +40,7 @@ class QueuedSegment:
 
     def start(self) -> None:
         """Get ready to run."""
-        s = self.segment
-        self.times = list(accumulate(intervals(s)))
+        self.times = list(accumulate(intervals(self.segment)))
 
 
 class Queue:
@@ -60,16 +65,16 @@ class Queue:
 
     def plan_counts(self) -> list[int]:
         """Counts where the queue ends."""
-        return [p >> 23 for p in self.plan]
+        return [count_at(place) for place in self.plan]
 
     def append(self, segments: list[Segment], at_rest: bool) -> None:
         """Queue segments (a step for every axis), the last one ending at rest or not."""
         for i, segment in enumerate(segments):
             self._queue.append(QueuedSegment(segment, at_rest and i + 1 == len(segments)))
             self._units += segment.units()
-            self.plan = [p + segment.ticks * r for p, r in zip(self.plan, segment.rates, strict=True)]
+            self.plan = _places_after(segment, self.plan)
         if at_rest:
-            self.plan = [p // STEP * STEP + HALF for p in self.plan]
+            self.plan = [count_at(place) * STEP + HALF for place in self.plan]
 
     def begin(self) -> None:
         """Run from the first segment's start."""
@@ -89,8 +94,9 @@ class Queue:
         """Steps of every axis in the running segment so far."""
         if not self._queue or not self._queue[0].times:
             return [0] * len(self.axes.base)
-        s, ticks = self._queue[0].segment, bisect_right(self._queue[0].times, self._cycles_run)
-        return [(f + ticks * r) >> 23 for f, r in zip(self._fraction, s.rates, strict=True)]
+        running = self._queue[0]
+        places = _places_after(running.segment, self._fraction, bisect_right(running.times, self._cycles_run))
+        return [count_at(place) for place in places]
 
     def velocity(self) -> list[float]:
         """Every axis's velocity just now, in any unit."""
@@ -103,11 +109,9 @@ class Queue:
             speed = self.stop_time()
             finished = self._queue.popleft()
             self._units -= finished.segment.units()
-            places = [
-                f + finished.segment.ticks * r for f, r in zip(self._fraction, finished.segment.rates, strict=True)
-            ]
-            self.axes.add_steps([p >> 23 for p in places])
-            self._fraction = [HALF if finished.end else p % STEP for p in places]
+            places = _places_after(finished.segment, self._fraction)
+            self.axes.add_steps([count_at(place) for place in places])
+            self._fraction = [HALF if finished.end else place % STEP for place in places]
             cycles_left = self._cycles_run - finished.times[-1]
             self.begin()
             self._cycles_run = cycles_left

@@ -26,6 +26,7 @@ from armkin.board.firmware.wire.segment_format import FINE_BOUND as FINE_BOUND
 from armkin.board.firmware.wire.segment_format import HALF as HALF
 from armkin.board.firmware.wire.segment_format import STEP as STEP
 from armkin.board.firmware.wire.segment_format import Segment as Segment
+from armkin.board.firmware.wire.segment_format import count_at as count_at
 from armkin.board.firmware.wire.segment_format import nearest_rate as nearest_rate
 from armkin.board.firmware.wire.segment_format import read_segment as read_segment
 from armkin.board.firmware.wire.segment_format import segment_size as segment_size

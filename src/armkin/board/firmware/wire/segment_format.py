@@ -15,6 +15,11 @@ _MAX_RATE = STEP - 128  # greatest rate, 2^-16 below a step a tick
 BLOCK = 16  # ticks with the same `add`, counted from the segment's end
 
 
+def count_at(place: int) -> int:
+    """The count of an axis at a place [2^-23 step]."""
+    return place // STEP
+
+
 @dataclass(frozen=True)
 class Segment:
     """A segment of T ticks, the first after `interval` cycles, with a rate for each axis.
@@ -69,7 +74,7 @@ class Segment:
     @property
     def steps(self) -> tuple[int, ...]:
         """Steps of every axis if the segment begins in the middle between two steps, as at rest."""
-        return tuple((HALF + self.ticks * r) >> 23 for r in self.rates)
+        return tuple(count_at(HALF + self.ticks * rate) for rate in self.rates)
 
     def units(self) -> int:
         """The segment's length as the queue counts it, in units of 256 cycles."""
@@ -106,20 +111,21 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
     >>> whole_steps(100, 1600, 0, (50, -100)).steps
     (50, -100)
     """
-    exact = (s * STEP / ticks for s in steps)
+    exact = (step * STEP / ticks for step in steps)
     short = ticks <= 255
     rates = (_coarse_rate(r) if short else nearest_rate(r) for r in exact)
     return Segment(ticks, interval, add * 256, tuple(rates))
 
 
-def pack_segment(s: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
+def pack_segment(segment: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     """A segment's bytes; bit i of the wide form's `fine` is axis i, bit 15 `quick`."""
+    ticks, interval, add, rates = segment.ticks, segment.interval, segment.add, segment.rates
     if not wide:
-        return struct.pack(f"<BHh{len(s.rates)}h", s.ticks, s.interval, s.add // 256, *map(_sent_rate, s.rates))
-    fine = [axis for axis, r in zip(axes, s.rates, strict=True) if abs(r) < FINE_BOUND]
-    short = (r if abs(r) < FINE_BOUND else _sent_rate(r) for r in s.rates)
-    head = struct.pack("<HH", s.ticks, s.interval) + s.add.to_bytes(3, "little", signed=True)
-    return head + struct.pack(f"<hH{len(s.rates)}h", s.bend, sum(1 << axis for axis in fine) | s.quick << 15, *short)
+        return struct.pack(f"<BHh{len(rates)}h", ticks, interval, add // 256, *map(_sent_rate, rates))
+    fine = sum(1 << axis for axis, rate in zip(axes, rates, strict=True) if abs(rate) < FINE_BOUND)
+    short = (rate if abs(rate) < FINE_BOUND else _sent_rate(rate) for rate in rates)
+    head = struct.pack("<HH", ticks, interval) + add.to_bytes(3, "little", signed=True)
+    return head + struct.pack(f"<hH{len(rates)}h", segment.bend, fine | segment.quick << 15, *short)
 
 
 def segment_size(axes: int, *, wide: bool) -> int:
