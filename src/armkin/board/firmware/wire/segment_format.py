@@ -119,12 +119,12 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
 
 def pack_segment(segment: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     """A segment's bytes; bit i of the wide form's `fine` is axis i, bit 15 `quick`."""
-    ticks, interval, add, rates = segment.ticks, segment.interval, segment.add, segment.rates
+    ticks, interval, rates = segment.ticks, segment.interval, segment.rates
     if not wide:
-        return struct.pack(f"<BHh{len(rates)}h", ticks, interval, add // 256, *map(_sent_rate, rates))
+        return struct.pack(f"<BHh{len(rates)}h", ticks, interval, segment.add // 256, *map(_sent_rate, rates))
     fine = sum(1 << axis for axis, rate in zip(axes, rates, strict=True) if abs(rate) < FINE_BOUND)
     short = (rate if abs(rate) < FINE_BOUND else _sent_rate(rate) for rate in rates)
-    head = struct.pack("<HH", ticks, interval) + add.to_bytes(3, "little", signed=True)
+    head = struct.pack("<HH", ticks, interval) + segment.add.to_bytes(3, "little", signed=True)
     return head + struct.pack(f"<hH{len(rates)}h", segment.bend, fine | segment.quick << 15, *short)
 
 
