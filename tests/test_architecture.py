@@ -56,8 +56,10 @@ MAY_IMPORT: dict[str, str] = {
     "motion/path_planner": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/branches"
     " inverse/answers inverse/solvers inverse motors path_file motion/timing motion/tool_path motion/plan"
     " motion/branches motion",
-    "reachability": "keep_out keep_out/shapes errors files formula robot_file model forward motors columns engines"
-    " inverse inverse/answers inverse/solvers inverse/tasks motion motion/plan motion/path_planner path_file",
+    "reachability": "keep_out errors files formula model forward motors columns engines inverse inverse/answers"
+    " inverse/solvers inverse/tasks",
+    "reachability/place": "keep_out errors files formula robot_file model columns engines inverse inverse/answers"
+    " inverse/solvers inverse/tasks path_file motion motion/plan motion/path_planner reachability",
     "export": "errors formula robot_file model forward inverse/tasks inverse/numeric inverse/elimination view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "export keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
@@ -68,7 +70,7 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
     " inverse/redundant user_folders",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion/plan motion/path_planner view"
-    " reachability",
+    " reachability reachability/place",
     "board/ports": "errors user_folders",
     "board/firmware/wire": "errors board/ports board/backend",
     "board/firmware/segments": "errors formula model forward motors motion motion/timing board/backend"

@@ -69,8 +69,8 @@ if TYPE_CHECKING:
     from armkin.motors import joints as joints
     from armkin.motors import pulses as pulses
     from armkin.motors import rounding as rounding
-    from armkin.reachability.place_search import Place as Place
-    from armkin.reachability.place_search import place as place
+    from armkin.reachability.place.place_search import Place as Place
+    from armkin.reachability.place.place_search import place as place
     from armkin.reachability.reach_map import Reach as Reach
     from armkin.reachability.reach_map import reach as reach
     from armkin.reachability.workspace_survey import workspace as workspace
@@ -116,8 +116,8 @@ _HOME = {
     "rounding": "motors",
     "Reach": "reachability.reach_map",
     "reach": "reachability.reach_map",
-    "Place": "reachability.place_search",
-    "place": "reachability.place_search",
+    "Place": "reachability.place.place_search",
+    "place": "reachability.place.place_search",
     "workspace": "reachability.workspace_survey",
 }
 

@@ -66,7 +66,7 @@ def places_agree(solve: Any = armkin.ik) -> bool:
     """400 poses from 37 x 37 places and 72 yaws, every shipped arm with a closed form; 1,000 places asked directly."""
     from armkin.inverse.solvers.recognise import solver
     from armkin.inverse.tasks.task import targets_of
-    from armkin.reachability import place_targets
+    from armkin.reachability.place import reached_targets
     from armkin.robot_file import catalogue
 
     total, different, arms = 0.0, 0, 0
@@ -88,9 +88,9 @@ def places_agree(solve: Any = armkin.ik) -> bool:
         took = time.process_time() - began
         total, arms = total + took, arms + 1
         print(f"{name:16}{took:.2f} s", flush=True)
-        question = place_targets.PlaceQuestion(arm, task, targets, 72, np.pi / 36, 0.0)
+        question = reached_targets.PlaceQuestion(arm, task, targets, 72, np.pi / 36, 0.0)
         for i, j, k in rng.integers(0, places.reached.shape, (1000 // 20, 3)).tolist():
-            legal = place_targets.legal_from(question, np.array([places.x[i], places.y[j]]), float(places.yaw[k]))
+            legal = reached_targets.legal_from(question, np.array([places.x[i], places.y[j]]), float(places.yaw[k]))
             different += int(legal.sum()) != places.reached[i, j, k]
     print(f"place     {arms} arms in {total:.1f} s (bar {PLACE:g}), {different} of {50 * arms:,} places differ")
     return total <= PLACE and not different

@@ -15,9 +15,9 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.motion.path_planner import redundant_joint
-from armkin.reachability import place_path, place_targets, place_upright
-from armkin.reachability import place_search as places
-from armkin.reachability.place_arm import Obstacles, arm_at_place
+from armkin.reachability.place import path_from_place, reached_targets, upright_joint
+from armkin.reachability.place import place_search as places
+from armkin.reachability.place.arm_among_obstacles import Obstacles, arm_at_place
 from command_line import ROOT, run
 from ctrl_c import interrupt_at
 
@@ -30,13 +30,13 @@ def test_places_are_what_each_says_when_asked_directly(name: str) -> None:
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     yaw = np.radians(60.0)
     [places] = armkin.place(arm, targets, step=arm.reach / 3, yaw=float(yaw))
-    question = place_targets.PlaceQuestion(arm, task_for(arm), targets, len(places.yaw), float(yaw), 0.0)
+    question = reached_targets.PlaceQuestion(arm, task_for(arm), targets, len(places.yaw), float(yaw), 0.0)
     assert places.of == 4
     assert places.reached.max() > 0
     for _ in range(60):
         i, j, k = (int(rng.integers(size)) for size in places.reached.shape)
         place = np.array([places.x[i], places.y[j]])
-        assert place_targets.legal_from(question, place, float(places.yaw[k])).sum() == places.reached[i, j, k]
+        assert reached_targets.legal_from(question, place, float(places.yaw[k])).sum() == places.reached[i, j, k]
 
 
 @pytest.mark.parametrize("name", ["so100", "so101", "three_dof", "ra02", "labvolt_5150", "planar_2dof"])
@@ -52,7 +52,7 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
     targets = targets_of(task_for(arm), armkin.fk(arm, q), q)
     ask: dict[str, Any] = {"step": arm.reach / 7, "yaw": 0.11, "z": -0.03 * arm.reach}
     read: list[int] = []
-    by_radius = place_upright.by_radius
+    by_radius = upright_joint.by_radius
 
     def count_and_call(*arguments: Any) -> Any:
         places = by_radius(*arguments)
@@ -60,10 +60,10 @@ def test_joint_1_beside_the_base_s_axis_is_read_off_by_radius(name: str, monkeyp
         read.append(int(places[0].sum()) - int(places[1].sum()))
         return places
 
-    monkeypatch.setattr(place_targets, "by_radius", count_and_call)
+    monkeypatch.setattr(reached_targets, "by_radius", count_and_call)
     [places] = armkin.place(arm, targets, **ask)
     assert sum(read) > 0.5 * places.reached.sum() > 0
-    monkeypatch.setattr(place_targets, "RADII", 10**9)  # not worth it: each place is asked
+    monkeypatch.setattr(reached_targets, "RADII", 10**9)  # not worth it: each place is asked
     [one_by_one] = armkin.place(arm, targets, **ask)
     assert np.array_equal(places.reached, one_by_one.reached)
 
@@ -188,14 +188,14 @@ def test_a_path_is_carried_from_the_places_that_plan_it(name: str, tmp_path: Pat
     assert places.planned
     assert {candidate.refused for candidate in places.planned} == {""}
     assert places.reached[places.best] == places.of
-    rng, file = np.random.default_rng(4), place_path.path_of(path)
+    rng, file = np.random.default_rng(4), path_from_place.path_of(path)
     assert file is not None
     carries = places.reached == places.of
     for cells in (np.argwhere(carries), np.argwhere(~carries & (places.reached > 0.6 * places.of))):
         assert len(cells)
         for i, j, k in rng.permutation(cells)[:3].tolist():
             place = (float(places.x[i]), float(places.y[j]), 0.0)
-            answer = place_path.plan_from_place(arm, Obstacles(), (i, j, k), place, float(places.yaw[k]), file)
+            answer = path_from_place.plan_from_place(arm, Obstacles(), (i, j, k), place, float(places.yaw[k]), file)
             assert (answer.plan is not None) == carries[i, j, k], answer.refused
 
 

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.plot.canvas import INK, SOFT, flat_axes, picture
-from armkin.reachability.place_arm import Obstacles, arm_at_place
+from armkin.reachability.place.arm_among_obstacles import Obstacles, arm_at_place
 from armkin.view.skeleton import skeleton
 
 if TYPE_CHECKING:
-    from armkin.reachability.place_search import Place
+    from armkin.reachability.place.place_search import Place
 
 TARGETS = "#e2572b"
 

@@ -8,18 +8,15 @@ volume.py            volume or area of the workspace, with an error
 cloud_file.py        the samples as a .csv, .npz or .ply file
 workspace_survey.py  `workspace`: all of this in one pass with bounded memory
 
-Reachable orientations and numbers of branches in a grid of cells, and placing an arm:
+Reachable orientations and numbers of branches in a grid of cells:
 
-reach_cells.py     rings of cells about the axis of joint 1, and the orientations in each cell
-cell_answers.py    results of a ring of cells, from arcs of joint 1 and the last joint, or from each pose
-voxels.py          cubic voxels for pictures of the cells
-reach_map.py       `reach`: all rings, in chunks, on any engine
-place_search.py    `place`: the best place of an arm for targets or a path; place_file.py: its file
-place_targets.py   targets that an arm reaches from a place; place_arm.py: the arm at a place, with obstacles
-place_upright.py   arms with a vertical joint 1 off the base's axis: answers by the distance from that joint
-best_place.py      the choice of the best place: by targets, margin, distance to joint limits
-place_branches.py  branches that follow a path from a place; place_path.py: plans from the best places
-kept_chunks.py     results of chunks, kept beside the file so that a run can be resumed
+reach_cells.py   rings of cells about the axis of joint 1, and the orientations in each cell
+cell_answers.py  results of a ring of cells, from arcs of joint 1 and the last joint, or from each pose
+voxels.py        cubic voxels for pictures of the cells
+reach_map.py     `reach`: all rings, in chunks, on any engine
+
+place/           the best place of an arm for targets or a path
+kept_chunks.py   results of chunks, kept beside the file so that a run can be resumed
 """
 
 from armkin.reachability.workspace_survey import Workspace, workspace

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from armkin.engines.ordered_chunks import Engine
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.reachability.place_path import PathFromPlace
-    from armkin.reachability.place_search import Place
+    from armkin.reachability.place.path_from_place import PathFromPlace
+    from armkin.reachability.place.place_search import Place
 
 RobotsAndFile = Annotated[
     list[str], typer.Argument(metavar="ROBOT... FILE", help="Robots, then a CSV of targets or a path (YAML).")
@@ -60,7 +60,7 @@ def place(
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
     from armkin.engines.ordered_chunks import Engine
-    from armkin.reachability.place_file import write
+    from armkin.reachability.place.place_file import write
 
     arms = [arguments.load_arm(word) for word in words[:-1]]
     settings = _grid_settings(step, z, yaw, area)
@@ -93,7 +93,7 @@ def _search_places(
 ) -> list[Place]:
     """The places of arms for the targets of a file, or for a path."""
     from armkin.inverse.solve import ik
-    from armkin.reachability.place_search import place_several
+    from armkin.reachability.place.place_search import place_several
 
     targets: list[Any] = [source if _is_path(source) else _targets(arm, source) for arm in arms]
     for arm in arms if compiled else ():

@@ -5,9 +5,9 @@ of the targets' frame, and a yaw about its z axis. If the axis of joint 1 is the
 changes joint 1 only, and one solve for each target and position answers all yaws as an arc. Other arms are solved for
 each yaw.
 
-A path counts as reached if one branch follows each part of it between joint moves (`place_branches`); the path is then
-planned from the best places (`place_path`). A redundant joint is held at each of the values that `armkin.path` tries,
-and the best of them counts.
+A path counts as reached if one branch follows each part of it between joint moves (`branches_from_place`); the path is
+then planned from the best places (`path_from_place`). A redundant joint is held at each of the values that
+`armkin.path` tries, and the best of them counts.
 
 The robot's own keep-outs move with it; those of a scene are fixed to the targets' frame.
 """
@@ -35,11 +35,12 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import read_targets
 from armkin.model.lock_joints import unlock
 from armkin.model.units import TURN
-from armkin.reachability import kept_chunks, place_path
-from armkin.reachability.best_place import Room, best_place, limit_rooms, margins
-from armkin.reachability.place_arm import split_keep_outs
-from armkin.reachability.place_path import PathFromPlace
-from armkin.reachability.place_targets import (
+from armkin.reachability import kept_chunks
+from armkin.reachability.place import path_from_place
+from armkin.reachability.place.arm_among_obstacles import split_keep_outs
+from armkin.reachability.place.best_place import Room, best_place, limit_rooms, margins
+from armkin.reachability.place.path_from_place import PathFromPlace
+from armkin.reachability.place.reached_targets import (
     PlaceQuestion,
     Solve,
     at_value,
@@ -143,8 +144,8 @@ def place(
         yaw: [rad] between places that differ in yaw alone.
         z: [mm] of all places.
         scene: a file of keep-outs that stand with the targets.
-        out: what is finished stays beside that file until `armkin.reachability.place_file.write` has written it: after
-            a kill it goes on.
+        out: what is finished stays beside that file until `armkin.reachability.place.place_file.write` has written it:
+            after a kill it goes on.
         workers: processes of this machine.
         cluster: address of a Dask scheduler, tcp://HOST:PORT, in place of workers.
         progress: called with the number of positions done.
@@ -190,7 +191,7 @@ def place_several(
     for name in ("step", "yaw"):
         if not (math.isfinite(settings[name]) and settings[name] > 0):
             raise UsageError(f"{name}: {settings[name]:g}; it must be above 0")
-    paths = [place_path.path_of(goals) for goals in targets]
+    paths = [path_from_place.path_of(goals) for goals in targets]
     per_arm = zip(arms, targets, paths, strict=True)
     questions = [_question(arm, goals, file, settings, scene) for arm, goals, file in per_arm]
     questions = [question._replace(solve=solve) for question in questions]
@@ -285,14 +286,14 @@ def _add_postures(question: PlaceQuestion, place: Place) -> Place:
 
 def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, room: Room) -> Place:
     """The place with plans from its best places; a place without a plan does not reach all targets."""
-    if reason := place_path.missing_rates_text(question.arm):
+    if reason := path_from_place.missing_rates_text(question.arm):
         return replace(place, unplanned=reason)
     tried: list[PathFromPlace] = []
     untried = place.reached.copy()
     while untried.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
         i, j, k = best_place(room, untried, place.margin)
         xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
-        tried.append(place_path.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
+        tried.append(path_from_place.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
         untried[i, j, k] = -1
         if tried[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
@@ -311,9 +312,9 @@ def _question(
     if file is None:
         task = task_for(arm, None)
     else:
-        task, routes = place_path.ways_of_path(arm, file)
+        task, routes = path_from_place.ways_of_path(arm, file)
         targets, ways = np.concatenate(routes), tuple(map(len, routes))
-        redundant_joint, held_values = place_path.joint_to_hold(arm, file)
+        redundant_joint, held_values = path_from_place.joint_to_hold(arm, file)
     arm, obstacles = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
     values, *_ = read_targets(task, targets)

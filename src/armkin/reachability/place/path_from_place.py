@@ -13,7 +13,7 @@ import numpy as np
 from armkin import path_file
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.reachability.place_arm import Obstacles, arm_at_place
+from armkin.reachability.place.arm_among_obstacles import Obstacles, arm_at_place
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

@@ -17,10 +17,10 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.lock_joints import lock, unlock
 from armkin.model.rotation import rotation_about
 from armkin.model.units import TURN
-from armkin.reachability import place_branches
 from armkin.reachability.cell_answers import legal_arc, pack_bits, some_copy_legal
-from armkin.reachability.place_arm import Obstacles, free_at_place
-from armkin.reachability.place_upright import RADII, by_radius
+from armkin.reachability.place import branches_from_place
+from armkin.reachability.place.arm_among_obstacles import Obstacles, free_at_place
+from armkin.reachability.place.upright_joint import RADII, by_radius
 from armkin.reachability.reach_cells import STRAIGHT
 
 if TYPE_CHECKING:
@@ -310,16 +310,16 @@ def _on_one_branch(question: PlaceQuestion, position: Array, yaws: NDArray[np.bo
     arm, K = question.arm, question.yaws
     if question.by_arcs:
         solutions = isolated_branches(arm, targets_from(question, position, 0.0), question.task.name)
-        is_complete, low, high = place_branches.branch_ranges(solutions, solutions.valid)
-        is_legal = is_complete & place_branches.some_copy_legal(arm, low, high, range(1, arm.n))
-        first, length = place_branches.branch_arc(arm, low[:, 0], high[:, 0], K, question.sense)
+        is_complete, low, high = branches_from_place.branch_ranges(solutions, solutions.valid)
+        is_legal = is_complete & branches_from_place.some_copy_legal(arm, low, high, range(1, arm.n))
+        first, length = branches_from_place.branch_arc(arm, low[:, 0], high[:, 0], K, question.sense)
         is_on_arc = (np.arange(K) - first[:, None]) % K < np.where(is_legal, length, 0)[:, None]
         return np.asarray(yaws & is_on_arc.any(axis=0))
     is_followed = np.zeros(K, bool)
     for k in np.flatnonzero(yaws).tolist():
         solutions, free = free_from(question, position, k * question.step, legal_only=False)
-        is_complete, low, high = place_branches.branch_ranges(solutions, free)
-        is_followed[k] = (is_complete & place_branches.some_copy_legal(arm, low, high, range(arm.n))).any()
+        is_complete, low, high = branches_from_place.branch_ranges(solutions, free)
+        is_followed[k] = (is_complete & branches_from_place.some_copy_legal(arm, low, high, range(arm.n))).any()
     return is_followed
 
 

@@ -16,7 +16,7 @@ from armkin.columns.formats import format_of
 from armkin.columns.table import Table, Words
 
 if TYPE_CHECKING:
-    from armkin.reachability.place_search import Place
+    from armkin.reachability.place.place_search import Place
 
 
 def write(places: Sequence[Place], out: str | os.PathLike[str]) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array
 from armkin.reachability.cell_answers import limit_margin
-from armkin.reachability.place_targets import PlaceQuestion, at_value, free_from
+from armkin.reachability.place.reached_targets import PlaceQuestion, at_value, free_from
 
 Room = Callable[[int, int, int], float]  # index of a place -> distance of its joints to limits, as a share of the range
 
