@@ -12,8 +12,13 @@ Columns = TypeVar("Columns")  # a named tuple of arrays
 def rows_of(columns: Columns, rows: NDArray[Any] | slice) -> Columns:
     """Some rows: by indices, flags or as a slice."""
     table: Any = columns
-    selected: Columns = table._make(column[rows] for column in table)
+    selected: Columns = table._make(_select(column, rows) for column in table)
     return selected
+
+
+def _select(column: Any, rows: NDArray[Any] | slice) -> Any:
+    """Rows of an array or of a named tuple."""
+    return rows_of(column, rows) if isinstance(column, tuple) else column[rows]
 
 
 def stack_rows(parts: Sequence[Columns]) -> Columns:
@@ -33,7 +38,10 @@ def replace_rows(columns: Columns, index: NDArray[Any], rows: Columns) -> Column
     return changed
 
 
-def _replace_values(column: NDArray[Any], index: NDArray[Any], rows: NDArray[Any]) -> NDArray[Any]:
+def _replace_values(column: Any, index: NDArray[Any], rows: Any) -> Any:
+    """Replace rows of an array or of a named tuple."""
+    if isinstance(column, tuple):
+        return replace_rows(column, index, rows)
     column = column if rows.ndim < 2 else widen_columns(column, rows.shape[1])
     column[index] = rows if rows.ndim < 2 else widen_columns(rows, column.shape[1])
     return column

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stack_rows
+from armkin.formula.array_tuples import replace_rows, rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -28,14 +28,26 @@ TRIES = 100  # steps, at most, of one arc
 ROUNDS = 20  # arcs, at most, of one curve, each to the next plane
 
 
+class _Rays(NamedTuple):
+    """Halves on their way through a slab, the part of their curves between two planes: R of those that are traced."""
+
+    number: Int  # (R,) which of the halves that are traced
+    row: Int  # (R,) whose target
+    slab: Int  # (R,) the plane below it
+    middle: Array  # (R,) the joint of the planes in the middle of the slab [rad]
+    half_width: Array  # (R,) [rad]
+    step: Array  # (R,) length of the next step [rad, reaches]
+    points: Points  # where they are
+
+
 class _Curves:
-    """Nodes of curves, and which halves are joined."""
+    """Nodes of curves, and to which half each of their halves (see `Nodes`) is joined: `partner`, -1 if to none."""
 
     def __init__(self, follower: Follower, owner: Int, q: Array) -> None:
         self.follower = follower
         self.planes, self.nodes, grid = answers_on_planes(follower, owner, q)
         self.partner = np.full(2 * len(self.nodes.row), -1)
-        self.traced = np.zeros(len(self.partner), bool)  # a half that comes to nothing would do so again
+        self.traced = np.zeros(len(self.partner), bool)  # a half whose ray was lost would lose it again
         next_plane = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
         following = np.take_along_axis(grid, next_plane[:, :, None], axis=1)
         adjacent = (grid >= 0) & (following >= 0)
@@ -112,24 +124,21 @@ class _Curves:
 
     def trace(self) -> None:
         """Open halves, step by step to where they leave their slab."""
-        ray = self.open()
-        ray = ray[~self.traced[ray]]
-        self.traced[ray] = True
-        arcs, end, plane = self._steps(ray)
-        arrived, every = np.flatnonzero(plane >= 0), np.arange(len(ray))
-        row, slab = self.nodes.row[ray >> 1], self.slab(ray)
-        number = self._on_plane(Nodes(row[arrived], plane[arrived], rows_of(end, arrived)))
-        goal, place = np.full(len(ray), -1), np.full(len(self.partner), len(ray))
-        goal[arrived], place[ray] = 2 * number + (plane[arrived] != slab[arrived]), every
+        half = self.open()
+        half = half[~self.traced[half]]
+        self.traced[half] = True
+        passed, end = self._follow_rays(half)
+        arrived, every = np.flatnonzero(end.plane >= 0), np.arange(len(half))
+        node = self._on_plane(rows_of(end, arrived))
+        goal, place = np.full(len(half), -1), np.full(len(self.partner), len(half))
+        goal[arrived], place[half] = 2 * node + (end.plane != self.slab(half))[arrived], every
         # an arc is traced from both of its ends: one of the two traces is kept
-        selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place[goal]) & (goal != ray)
+        selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place[goal]) & (goal != half)
         selected &= np.isin(every, np.unique(goal, return_index=True)[1])
-        rays, owner = np.flatnonzero(selected), np.concatenate([rays for rays, _ in arcs])
-        passing = np.flatnonzero(selected[owner])
-        points, owner = rows_of(stack_rows([points for _, points in arcs]), passing), owner[passing]
-        added = self._add(Nodes(row[owner], np.full(len(passing), -1), points))
-        a = np.append(ray[rays], 2 * added)[np.argsort(np.append(rays, owner), kind="stable")]
-        b = np.append(2 * added + 1, goal[rays])[np.argsort(np.append(owner, rays), kind="stable")]
+        rays, passed = np.flatnonzero(selected), rows_of(passed, selected[passed.number])
+        added = self._add(Nodes(passed.row, np.full(len(passed.row), -1), passed.points))
+        a = np.append(half[rays], 2 * added)[np.argsort(np.append(rays, passed.number), kind="stable")]
+        b = np.append(2 * added + 1, goal[rays])[np.argsort(np.append(passed.number, rays), kind="stable")]
         self._join(a, b)
 
     def _on_plane(self, arrived: Nodes) -> Int:
@@ -150,43 +159,59 @@ class _Curves:
             self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
         return number
 
-    def _steps(self, ray: Int) -> tuple[list[tuple[Int, Points]], Points, Int]:
-        """From halves (M,): points on the way, of which rays; those on the plane at the end, and which, -1: lost."""
-        follower, j, values = self.follower, self.planes.guide.joint, self.planes.values
-        unit = radian_or_reach(follower.arm)
-        row, slab, current = self.nodes.row[ray >> 1], self.slab(ray), self.nodes.leaving(ray)
-        next_plane = (slab + 1) % self.planes.counts[row]
-        low, h = values[row, slab], np.full(len(ray), MAX_STEP)
-        width = np.remainder(values[row, next_plane] - low, 2 * np.pi)
-        end, plane = Points(*(x.copy() for x in current)), np.full(len(ray), -1)
-        arcs, rays = [(ray[:0], rows_of(current, ray[:0]))], np.arange(len(ray))
+    def _rays(self, half: Int) -> _Rays:
+        """The rays of halves (M,), where they begin."""
+        row, slab = self.nodes.row[half >> 1], self.slab(half)
+        low, high = (self.planes.values[row, plane % self.planes.counts[row]] for plane in (slab, slab + 1))
+        half_width, step = 0.5 * np.remainder(high - low, 2 * np.pi), np.full(len(half), MAX_STEP)
+        return _Rays(np.arange(len(half)), row, slab, low + half_width, half_width, step, self.nodes.leaving(half))
+
+    def _follow_rays(self, half: Int) -> tuple[_Rays, Nodes]:
+        """Halves (M,) step by step through their slabs: as rays at all points that they pass on the way, and the nodes
+        that they come to (M,), on plane -1 where a ray is lost."""
+        rays, passed = self._rays(half), []
+        end = Nodes(rays.row, np.full(len(half), -1), rows_of(rays.points, rays.number))
         for _ in range(TRIES):
-            begin, step = rows_of(current, rays), h[rays, None]
-            predicted = begin.q + step * begin.tangent * unit
-            on_arc = onto_curves(follower, row[rays], predicted, begin.tangent, tol.SAME_SEED)
-            arc = Ways.between(follower, begin, on_arc)
-            drift = np.sqrt(((arc.chord - step * begin.tangent) ** 2).sum(axis=1))
-            valid = (on_arc.step < tol.SAME_SEED) & (drift < SIDE_SHARE * h[rays]) & arc.follow(follower, row[rays])
-            h[rays] = np.where(valid, np.minimum(1.5 * h[rays], MAX_STEP), 0.5 * h[rays])
-            middle = low[rays] + 0.5 * width[rays]
-            depth, last_depth = (wrap_angle(points.q[:, j] - middle) for points in (on_arc, begin))
-            leaves = valid & (np.abs(depth) >= 0.5 * width[rays]) & (np.abs(depth - last_depth) > tol.TINY)
-            leaving, upward = rays[leaves], depth[leaves] > 0
-            goal = np.where(upward, 0.5, -0.5) * width[leaving]
-            share = np.clip((goal - last_depth[leaves]) / (depth[leaves] - last_depth[leaves]), 0.0, 1.0)
-            guess = begin.q[leaves] + share[:, None] * arc.chord[leaves] * unit
-            guess[:, j] = middle[leaves] + goal
-            crossing = onto_curves(follower, row[leaving], guess, self.planes.held(len(leaving)))
-            plane[leaving] = np.where(crossing.settled, np.where(upward, next_plane[leaving], slab[leaving]), -1)
+            points, valid = self._advance(rays)
+            leaves = valid & self._leave_slab(rays, points)
+            crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
+            replace_rows(end, rays.number[leaves], crossing)
             continues = valid & ~leaves
-            arcs.append((rays[continues], rows_of(on_arc, continues)))
-            for column, new, last, final in zip(current, on_arc, end, crossing, strict=True):
-                column[rays[continues]] = new[continues]
-                last[leaving] = final
-            rays = rays[~leaves & (h[rays] > tol.SHORTEST_ARC)]
-            if not len(rays):
+            replace_rows(rays.points, continues, rows_of(points, continues))
+            passed.append(rows_of(rays, continues))
+            rays = rays._replace(step=np.where(valid, np.minimum(1.5 * rays.step, MAX_STEP), 0.5 * rays.step))
+            rays = rows_of(rays, ~leaves & (rays.step > tol.SHORTEST_ARC))
+            if not len(rays.number):
                 break
-        return arcs, end, plane
+        return stack_rows(passed), end
+
+    def _advance(self, rays: _Rays) -> tuple[Points, Bool]:
+        """The points to which a step along the tangents leads rays (R,), and whether along their curves."""
+        follower, begin, step = self.follower, rays.points, rays.step[:, None]
+        predicted = begin.q + step * begin.tangent * radian_or_reach(follower.arm)
+        points = onto_curves(follower, rays.row, predicted, begin.tangent, tol.SAME_SEED)
+        arcs = Ways.between(follower, begin, points)
+        drift = np.sqrt(((arcs.chord - step * begin.tangent) ** 2).sum(axis=1))
+        is_close = (points.step < tol.SAME_SEED) & (drift < SIDE_SHARE * rays.step)
+        return points, is_close & arcs.follow(follower, rays.row)
+
+    def _leave_slab(self, rays: _Rays, points: Points) -> Bool:
+        """Which rays (R,) leave their slabs by a step to points."""
+        joint = self.planes.guide.joint
+        depth, begin_depth = (wrap_angle(end.q[:, joint] - rays.middle) for end in (points, rays.points))
+        return np.asarray((np.abs(depth) >= rays.half_width) & (np.abs(depth - begin_depth) > tol.TINY))
+
+    def _cross_plane(self, rays: _Rays, points: Points) -> Nodes:
+        """Where rays (R,) that leave their slabs by a step to points cross a plane; -1: that posture is not found."""
+        begin, arm, joint = rays.points, self.follower.arm, self.planes.guide.joint
+        depth, begin_depth = (wrap_angle(end.q[:, joint] - rays.middle) for end in (points, begin))
+        goal = np.where(depth > 0, rays.half_width, -rays.half_width)
+        share = np.clip((goal - begin_depth) / (depth - begin_depth), 0.0, 1.0)
+        guess = begin.q + share[:, None] * newton.difference(arm, points.q, begin.q) * radian_or_reach(arm)
+        guess[:, joint] = rays.middle + goal
+        crossing = onto_curves(self.follower, rays.row, guess, self.planes.held(len(guess)))
+        plane = (rays.slab + (depth > 0)) % self.planes.counts[rays.row]
+        return Nodes(rays.row, np.where(crossing.settled, plane, -1), crossing)
 
 
 class Chains(NamedTuple):
