@@ -13,7 +13,7 @@ from armkin.calibration import observability
 from armkin.calibration.corrected_chain import KINDS, Model, correction_model
 from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check_measurements
-from armkin.calibration.model_selection import LEVELS, MANY_ROWS, Choice, choose_level, free_at
+from armkin.calibration.model_selection import LEVELS, MANY_ROWS, Choice, choose_level, free_indices_at
 from armkin.calibration.robust_fit import Fit, Measurements
 from armkin.errors import UsageError
 from armkin.export import conventions
@@ -26,8 +26,8 @@ from armkin.robot_file.robot_file_text import format_robot_file
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-STATED = 20  # rows from which on deviations are stated; with 8 to 10 rows only half of the errors lie within one
-HOPELESS = 0.25  # error on unseen rows, as a share of the points' spread, above which calibration fails
+STATED_ROWS = 20  # rows from which on deviations are stated; with 8 to 10 rows only half of the errors lie within one
+HOPELESS_SHARE = 0.25  # error on unseen rows, as a share of the points' spread, above which calibration fails
 
 # tasks that need parallel axes, or axes along the base's z; corrections must not change these directions
 _PARALLEL = ("xy", "xy_theta", "xyz_yaw", "xyz_pitch", "xyz_pitch_roll", "xyz_roll")
@@ -129,12 +129,12 @@ def calibrate(
     fixed = _fixed_kinds(fix)
     rows = _measurements(arm, q, measured)
     check_measurements(arm, rows)
-    corrections = correction_model(arm)
+    model = correction_model(arm)
     fixed_names, reasons = fixed_corrections(arm, fixed)
-    choice = choose_level(corrections, rows, fixed_names, tick)
-    _must_explain(rows, choice)
+    choice = choose_level(model, rows, fixed_names, tick)
+    _require_fit(rows, choice)
     best_fit = choice.fit
-    corrected_arm, tool = corrections.corrected_arm(best_fit.p)
+    corrected_arm, tool = model.corrected_arm(best_fit.corrections)
     return Calibration(
         arm=corrected_arm,
         data=conventions.screws(corrected_arm, conventions.tool_of(arm) @ tool),
@@ -143,21 +143,21 @@ def calibrate(
         after=choice.errors[choice.level],
         flagged=dropped_row_numbers(best_fit.weights),
         noise=best_fit.scale[0],
-        corrections=_list_corrections(corrections, best_fit, len(rows)),
-        unseen=observability.unseen_corrections(corrections, best_fit),
+        corrections=_list_corrections(model, best_fit, len(rows)),
+        unseen=observability.unseen_corrections(model, best_fit),
         held=reasons,
     )
 
 
 def _list_corrections(model: Model, fit: Fit, rows: int) -> list[tuple[str, float, float, str]]:
     """Name, value, standard deviation (nan for few rows) and unit (mm, rad, 1) of each free correction."""
-    deviations = observability.doubts(model, fit) if len(fit.free) else np.zeros(0)
-    if rows < STATED:
+    deviations = observability.correction_deviations(model, fit) if len(fit.free_indices) else np.zeros(0)
+    if rows < STATED_ROWS:
         deviations = np.full(len(deviations), np.nan)
     corrections = []
-    for number, deviation in zip(fit.free, deviations, strict=True):
+    for number, deviation in zip(fit.free_indices, deviations, strict=True):
         parameter = model.parameters[number]
-        corrections.append((parameter.name, float(fit.p[number]), float(deviation), parameter.unit))
+        corrections.append((parameter.name, float(fit.corrections[number]), float(deviation), parameter.unit))
     return corrections
 
 
@@ -166,11 +166,11 @@ def next_poses(arm: Arm, count: int, q: ArrayLike | None = None, *, fix: Iterabl
 
     q: (M, n) poses measured already; fix as in `calibrate`.
     """
-    corrections = correction_model(arm)
+    model = correction_model(arm)
     fixed, _ = fixed_corrections(arm, _fixed_kinds(fix))
     measured = None if q is None else as_joints(arm, q).reshape(-1, arm.n)
-    none = Measurements(np.zeros((0, arm.n)), np.zeros((0, 3)))
-    return observability.suggest_poses(corrections, count, free_at(corrections, len(LEVELS) - 1, none, fixed), measured)
+    no_rows = Measurements(np.zeros((0, arm.n)), np.zeros((0, 3)))
+    return observability.suggest_poses(model, count, free_indices_at(model, len(LEVELS) - 1, no_rows, fixed), measured)
 
 
 def fixed_corrections(arm: Arm, fixed: set[str]) -> tuple[set[str], list[str]]:
@@ -215,11 +215,12 @@ def _measurements(arm: Arm, q: ArrayLike, measured: ArrayLike) -> Measurements:
     return Measurements(commanded, values[:, :3, 3], values[:, :3, :3])
 
 
-def _must_explain(rows: Measurements, choice: Choice) -> None:
+def _require_fit(rows: Measurements, choice: Choice) -> None:
     """Raise UsageError if the corrected arm misses half of the rows by too much of their spread."""
     spread = float(np.median(np.linalg.norm(rows.position - np.median(rows.position, axis=0), axis=1)))
     error = float(np.median(choice.errors[choice.level]))
-    allowed_share = HOPELESS if len(rows) >= MANY_ROWS else 1.0  # with few rows, errors on unseen rows are unreliable
+    # with few rows, errors on unseen rows are unreliable
+    allowed_share = HOPELESS_SHARE if len(rows) >= MANY_ROWS else 1.0
     if error > allowed_share * spread:
         raise UsageError(
             f"the rows do not fit this arm: half of them stay more than {error:.3g} mm off, of points {spread:.3g} mm "

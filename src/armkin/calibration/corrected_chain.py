@@ -32,10 +32,10 @@ NEARLY_PARALLEL = 0.05  # angle [rad] below which the common normal may be too f
 
 # prior: standard deviations between a built arm and its table; those of base and measuring tip are large, because
 # users place and mount them by hand
-LENGTH, SLIDE, RATIO = 0.5, 0.5, 0.003  # [mm, mm, 1]
-TWIST, ZERO = math.radians(0.3), math.radians(1.0)
-BASE, TOOL = 200.0, 20.0  # [mm]
-BASE_TURN, TOOL_TURN = math.radians(30.0), math.radians(10.0)
+LENGTH_PRIOR, SLIDE_PRIOR, RATIO_PRIOR = 0.5, 0.5, 0.003  # [mm, mm, 1]
+TWIST_PRIOR, ZERO_PRIOR = math.radians(0.3), math.radians(1.0)
+BASE_PRIOR, TOOL_PRIOR = 200.0, 20.0  # [mm]
+BASE_TURN_PRIOR, TOOL_TURN_PRIOR = math.radians(30.0), math.radians(10.0)
 
 
 class Parameter(NamedTuple):
@@ -74,13 +74,13 @@ class Model:
         """Indices of the parameters of a kind."""
         return np.flatnonzero([parameter.kind == kind for parameter in self.parameters])
 
-    def poses(self, p: Array, c: Array) -> tuple[Array, Array]:
-        """Poses of commanded values c (M, n) with corrections p (P,), and their derivatives.
+    def poses(self, corrections: Array, commanded: Array) -> tuple[Array, Array]:
+        """Poses of commanded values (M, n) with corrections (P,), and their derivatives.
 
         Returns (M, 4, 4) and (M, 6, P): the translation [mm] (first rows) and rotation [rad] of the tip in the
         measuring frame for a unit of each correction.
         """
-        M, n = c.shape
+        M, n = commanded.shape
         T = np.zeros((M, 4, 4)) + np.eye(4)
         axes = np.zeros((len(self.parameters), M, 3))
         points = np.zeros((len(self.parameters), M, 3))
@@ -90,23 +90,23 @@ class Model:
             if step.constant is not None:
                 T = T @ step.constant
                 continue
-            k = zeros[step.joint] if step.joint >= 0 else step.parameter
+            j = step.joint
+            k = zeros[j] if j >= 0 else step.parameter
             axes[k], points[k], rotates[k] = T[:, :3, step.axis], T[:, :3, 3], step.turns
-            value: Array | float = p[k]
-            if step.joint >= 0:
-                j = step.joint
-                value = p[k] + (self.arm.ratio[j] + p[ratios[j]]) * c[:, j]
+            value: Array | float = corrections[k]
+            if j >= 0:
+                value = corrections[k] + (self.arm.ratio[j] + corrections[ratios[j]]) * commanded[:, j]
             T = _move_columns(T, step, value)
         tip = T[:, :3, 3]
         is_rotation = rotates[:, None, None]
         translations = np.where(is_rotation, np.cross(axes, tip - points), axes)
         J = np.concatenate([translations, axes * is_rotation], axis=2).transpose(1, 2, 0)
         for j in range(n):
-            J[:, :, ratios[j]] = J[:, :, zeros[j]] * c[:, j, None]
+            J[:, :, ratios[j]] = J[:, :, zeros[j]] * commanded[:, j, None]
         return T, J
 
-    def corrected_arm(self, p: Array) -> tuple[Arm, Array]:
-        """The arm with corrections p, and its tool (4, 4)."""
+    def corrected_arm(self, corrections: Array) -> tuple[Arm, Array]:
+        """The arm with corrections (P,), and its tool (4, 4)."""
         arm, ratios = self.arm, self.indices("ratios")
         links: list[Array] = []
         T = np.eye(4)
@@ -114,29 +114,29 @@ class Model:
             if step.constant is not None:
                 T = T @ step.constant
             elif step.joint < 0:
-                T = T @ _axis_motion(step, p[step.parameter])
+                T = T @ _axis_motion(step, corrections[step.parameter])
             else:
-                links.append(T @ _axis_motion(step, p[self.indices("zeros")[step.joint]]))
+                links.append(T @ _axis_motion(step, corrections[self.indices("zeros")[step.joint]]))
                 T = np.eye(4)
         links.append(T)
-        base = self._product("base", p) @ arm.base
+        base = self._product("base", corrections) @ arm.base
         sign = np.where(arm.dh_sign < 0, -1.0, 1.0)
-        zeros = p[self.indices("zeros")]
+        zeros = corrections[self.indices("zeros")]
         corrected_arm = replace(
             arm,
             link=_freeze(np.array(links)),
             base=_freeze(base),
-            ratio=_freeze(arm.ratio + p[ratios]),
+            ratio=_freeze(arm.ratio + corrections[ratios]),
             dh_theta=_freeze(arm.dh_theta + np.where(arm.prismatic, 0.0, sign * zeros)),
         )
-        return corrected_arm, self._product("tool", p)
+        return corrected_arm, self._product("tool", corrections)
 
-    def _product(self, kind: str, p: Array) -> Array:
+    def _product(self, kind: str, corrections: Array) -> Array:
         """The product of the motions of one kind."""
         T = np.eye(4)
         for step in self.steps:
             if step.parameter >= 0 and self.parameters[step.parameter].kind == kind:
-                T = T @ _axis_motion(step, p[step.parameter])
+                T = T @ _axis_motion(step, corrections[step.parameter])
         return T
 
 
@@ -145,34 +145,35 @@ def correction_model(arm: Arm) -> Model:
     parameters: list[Parameter] = []
     steps: list[_Step] = []
 
-    def move(kind: str, name: str, unit: str, prior: float, axis: int) -> None:
+    def add_motion(kind: str, name: str, unit: str, prior: float, axis: int) -> None:
         steps.append(_Step(None, axis, unit == "rad", parameter=len(parameters)))
         parameters.append(Parameter(kind, name, unit, prior))
 
-    def frame(kind: str, size: float, turn: float) -> None:
+    def add_frame(kind: str, distance_prior: float, turn_prior: float) -> None:
         for axis in range(3):
-            move(kind, f"{kind} {'xyz'[axis]}", "mm", size, axis)
+            add_motion(kind, f"{kind} {'xyz'[axis]}", "mm", distance_prior, axis)
         for axis in (2, 1, 0):
-            move(kind, f"{kind} {('roll', 'pitch', 'yaw')[axis]}", "rad", turn, axis)
+            add_motion(kind, f"{kind} {('roll', 'pitch', 'yaw')[axis]}", "rad", turn_prior, axis)
 
-    frame("base", BASE, BASE_TURN)
+    add_frame("base", BASE_PRIOR, BASE_TURN_PRIOR)
     steps.append(_Step(arm.link[0]))
     for joint, name in enumerate(arm.joint_names):
         is_prismatic = bool(arm.prismatic[joint])
         steps.append(_Step(None, 2, not is_prismatic, joint=joint))
-        parameters.append(Parameter("zeros", f"{name} zero", *(("mm", SLIDE) if is_prismatic else ("rad", ZERO))))
-        parameters.append(Parameter("ratios", f"{name} ratio", "1", RATIO))
+        unit, prior = ("mm", SLIDE_PRIOR) if is_prismatic else ("rad", ZERO_PRIOR)
+        parameters.append(Parameter("zeros", f"{name} zero", unit, prior))
+        parameters.append(Parameter("ratios", f"{name} ratio", "1", RATIO_PRIOR))
         if joint == arm.n - 1:
             break
         A = _link_along_normal(arm.link[joint + 1], arm.reach)
         steps.append(_Step(A))
-        move("lengths", f"{name} d", "mm", LENGTH, 2)
-        move("lengths", f"{name} a", "mm", LENGTH, 0)
-        move("twists", f"{name} alpha", "rad", TWIST, 0)
-        move("twists", f"{name} beta", "rad", TWIST, 1)
+        add_motion("lengths", f"{name} d", "mm", LENGTH_PRIOR, 2)
+        add_motion("lengths", f"{name} a", "mm", LENGTH_PRIOR, 0)
+        add_motion("twists", f"{name} alpha", "rad", TWIST_PRIOR, 0)
+        add_motion("twists", f"{name} beta", "rad", TWIST_PRIOR, 1)
         steps.append(_Step(inverse(A) @ arm.link[joint + 1]))
     steps.append(_Step(arm.link[-1]))
-    frame("tool", TOOL, TOOL_TURN)
+    add_frame("tool", TOOL_PRIOR, TOOL_TURN_PRIOR)
     return Model(arm, tuple(parameters), tuple(steps))
 
 

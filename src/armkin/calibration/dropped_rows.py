@@ -12,41 +12,41 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 
 K = 4.0  # residuals beyond K scales lose three quarters of their weight
-MEDIAN = 1.5382  # median of the length of three standard normal numbers
+MEDIAN_NORM = 1.5382  # median of the length of three standard normal numbers
 MIN_SCALES = 0.005, 1e-5  # smallest scale [mm, rad], about the last digit of a measurement
-DROPPED = 0.1  # weight below which a row is reported as dropped
+DROPPED_WEIGHT = 0.1  # weight below which a row is reported as dropped
 
 
-def weights(r: Array | None, scale: float) -> Array:
+def weights(residuals: Array | None, scale: float) -> Array:
     """The weights (M,) of residuals (M, 3); 1 for all without measurements."""
-    if r is None:
+    if residuals is None:
         return np.ones(1)
-    return np.asarray((1.0 + _squared_norms(r, scale) / K**2) ** -2)
+    return np.asarray((1.0 + _squared_norms(residuals, scale) / K**2) ** -2)
 
 
-def loss(r: Array, scale: float) -> float:
+def loss(residuals: Array, scale: float) -> float:
     """The sum of rho over residuals (M, 3), whose derivative gives `weights`."""
-    u2 = _squared_norms(r, scale)
-    return float((u2 / (1.0 + u2 / K**2)).sum())
+    u_squared = _squared_norms(residuals, scale)
+    return float((u_squared / (1.0 + u_squared / K**2)).sum())
 
 
-def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_numbers: float) -> tuple[float, float]:
+def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_count: float) -> tuple[float, float]:
     """The noise of a component [mm, rad] from the median residual, corrected for the number of fitted parameters."""
     count = position_residuals.size + (0 if rotation_residuals is None else rotation_residuals.size)
-    correction = np.sqrt(count / max(count - fitted_numbers, 0.25 * count))
-    position_scale = float(np.median(np.linalg.norm(position_residuals, axis=1))) / MEDIAN * correction
+    correction = np.sqrt(count / max(count - fitted_count, 0.25 * count))
+    position_scale = float(np.median(np.linalg.norm(position_residuals, axis=1))) / MEDIAN_NORM * correction
     rotation_scale = (
         0.0
         if rotation_residuals is None
-        else float(np.median(np.linalg.norm(rotation_residuals, axis=1))) / MEDIAN * correction
+        else float(np.median(np.linalg.norm(rotation_residuals, axis=1))) / MEDIAN_NORM * correction
     )
     return max(position_scale, MIN_SCALES[0]), max(rotation_scale, MIN_SCALES[1])
 
 
 def dropped_row_numbers(weights: Array) -> NDArray[np.intp]:
     """The indices of rows that a fit with these weights (M,) ignored."""
-    return np.flatnonzero(weights < DROPPED)
+    return np.flatnonzero(weights < DROPPED_WEIGHT)
 
 
-def _squared_norms(r: Array, scale: float) -> Array:
-    return np.asarray(np.einsum("mi,mi->m", r, r) / scale**2)
+def _squared_norms(residuals: Array, scale: float) -> Array:
+    return np.asarray(np.einsum("mi,mi->m", residuals, residuals) / scale**2)

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 MIN_ROWS = 4  # fewest rows of a measurement
 STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint counts as not moving
-ON_A_LINE = 0.01  # thickness of a cloud, as a share of its length, below which its points are on a line
-FITS = 0.1  # error, as a share of the points' spread, below which no other reading is tried
-EXPLAINS = 0.35  # share of the error that another reading must not exceed to be the explanation
+LINE_THICKNESS = 0.01  # thickness of a cloud, as a share of its length, below which its points are on a line
+FIT_SHARE = 0.1  # error, as a share of the points' spread, below which no other reading is tried
+EXPLAINED_SHARE = 0.35  # share of the error that another reading must not exceed to be the explanation
 
 
 def check_measurements(arm: Arm, data_rows: Measurements) -> None:
@@ -38,7 +38,7 @@ def check_measurements(arm: Arm, data_rows: Measurements) -> None:
 def _check_motion(arm: Arm, rows: Measurements) -> None:
     """Raise UsageError if a joint never moves, or all of them in step."""
     thresholds = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
-    motionless = np.flatnonzero(np.ptp(rows.c, axis=0) < thresholds)
+    motionless = np.flatnonzero(np.ptp(rows.commanded, axis=0) < thresholds)
     if len(motionless):
         names = ", ".join(arm.joint_names[j] for j in motionless)
         raise UsageError(
@@ -46,7 +46,7 @@ def _check_motion(arm: Arm, rows: Measurements) -> None:
             f"{'it' if len(motionless) == 1 else 'them'} cannot be determined; measure poses that move every joint"
         )
     unit = radian_or_reach(arm)
-    sizes = np.linalg.svd((rows.c - rows.c.mean(axis=0)) / unit, compute_uv=False)
+    sizes = np.linalg.svd((rows.commanded - rows.commanded.mean(axis=0)) / unit, compute_uv=False)
     if arm.n > 1 and sizes[1] < 1e-3 * sizes[0]:
         raise UsageError(
             "all joints move in step from row to row: their effects cannot be told apart; "
@@ -60,7 +60,7 @@ def _check_spread(rows: Measurements) -> None:
     # use the rows nearest to the middle of the cloud, as a single wrong row would make a line look thick
     inner_rows = np.argsort(np.linalg.norm(centred, axis=1))[: max(MIN_ROWS, math.ceil(0.8 * len(centred)))]
     sizes = np.linalg.svd(centred[inner_rows] - centred[inner_rows].mean(axis=0), compute_uv=False)
-    if sizes[1] < ON_A_LINE * sizes[0] or sizes[0] == 0:
+    if sizes[1] < LINE_THICKNESS * sizes[0] or sizes[0] == 0:
         raise UsageError(
             "the measured points lie on a line: a turn about it leaves them where they are; measure points all around"
         )
@@ -70,22 +70,22 @@ class _Reading(NamedTuple):
     """Another interpretation of the rows."""
 
     explanation: str
-    c: Array
-    position: Array
+    commanded: Array  # (M, n)
+    position: Array  # (M, 3)
 
 
 def _check_readings(arm: Arm, rows: Measurements) -> None:
     """Raise UsageError if the rows fit far better in other units or with columns or signs changed."""
-    expected = position(arm, rows.c)
+    expected = position(arm, rows.commanded)
     size = _cloud_size(rows.position)
     miss, median_miss = _aligned_miss(expected, rows.position), _median_miss(expected, rows.position)
     hint = ""
-    if median_miss > FITS * size:
-        hint = _axes_in_place(expected, rows.position, 0.2 * median_miss, FITS * size)
-    if not hint and miss > FITS * size:
-        least_miss = EXPLAINS * miss
+    if median_miss > FIT_SHARE * size:
+        hint = _axes_in_place(expected, rows.position, 0.2 * median_miss, FIT_SHARE * size)
+    if not hint and miss > FIT_SHARE * size:
+        least_miss = EXPLAINED_SHARE * miss
         for reading in _readings(arm, rows):
-            tips = position(arm, reading.c)
+            tips = position(arm, reading.commanded)
             reading_miss = _aligned_miss(tips, reading.position) * size / max(_cloud_size(reading.position), 1e-12)
             if reading_miss < least_miss:
                 least_miss, hint = 0.999 * reading_miss, reading.explanation
@@ -115,27 +115,27 @@ _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "
 
 def _readings(arm: Arm, rows: Measurements) -> list[_Reading]:
     """The rows in other units, with columns swapped, or with the sign of one joint changed."""
-    c, x = rows.c, rows.position
+    commanded, points = rows.commanded, rows.position
     degree = units.joint_scale(arm)
     readings = [
-        _Reading("the joint values look like radians where degrees are expected", c / degree, x),
-        _Reading("the joint values look like degrees where radians are expected", c * degree, x),
-        _Reading("the measured points look like metres where millimetres are expected", c, x * 1e3),
-        _Reading("the measured points look like micrometres where millimetres are expected", c, x * 1e-3),
-        _Reading("the measured points look like inches where millimetres are expected", c, x * 25.4),
+        _Reading("the joint values look like radians where degrees are expected", commanded / degree, points),
+        _Reading("the joint values look like degrees where radians are expected", commanded * degree, points),
+        _Reading("the measured points look like metres where millimetres are expected", commanded, points * 1e3),
+        _Reading("the measured points look like micrometres where millimetres are expected", commanded, points * 1e-3),
+        _Reading("the measured points look like inches where millimetres are expected", commanded, points * 25.4),
     ]
     for i, j in itertools.combinations(range(arm.n), 2):
         order = list(range(arm.n))
         order[i], order[j] = j, i
         names = f"{arm.joint_names[i]} and {arm.joint_names[j]}"
-        readings.append(_Reading(f"the columns of {names} look swapped", c[:, order], x))
+        readings.append(_Reading(f"the columns of {names} look swapped", commanded[:, order], points))
     for j in range(arm.n):
         sign = np.ones(arm.n)
         sign[j] = -1.0
-        readings.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", c * sign, x))
+        readings.append(_Reading(f"{arm.joint_names[j]} looks commanded with the other sign", commanded * sign, points))
     for axes in ((0, 2, 1), (2, 1, 0), (1, 0, 2)):
         explanation = f"columns {_axis_names(axes)} of the measured points look like x y z"
-        readings.append(_Reading(explanation, c, x[:, axes]))
+        readings.append(_Reading(explanation, commanded, points[:, axes]))
     return readings
 
 
@@ -143,9 +143,9 @@ def _axis_names(order: tuple[int, ...]) -> str:
     return " ".join("xyz"[k] for k in order)
 
 
-def _cloud_size(x: Array) -> float:
+def _cloud_size(points: Array) -> float:
     """Median distance of points (M, 3) from their median."""
-    return float(np.median(np.linalg.norm(x - np.median(x, axis=0), axis=1)))
+    return float(np.median(np.linalg.norm(points - np.median(points, axis=0), axis=1)))
 
 
 def _median_miss(expected: Array, measured: Array) -> float:

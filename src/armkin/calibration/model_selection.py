@@ -14,19 +14,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.calibration.corrected_chain import KINDS, Model, Parameter
-from armkin.calibration.observability import left_open
+from armkin.calibration.observability import tip_deviation
 from armkin.calibration.robust_fit import Fit, Measurements, fit_corrections, residuals
 from armkin.formula.arrays import Array
 
 LEVELS = ("file", "base and tool", "zeros", "ratios", "lengths", "twists")
 FOLDS = 5  # parts of the rows, of which each is left out once
-GAIN = 0.97  # greatest squared error of the first level above the file, as a share of the file's
+FIRST_ERROR_SHARE = 0.97  # greatest squared error of the first level above the file, as a share of the file's
 CERTAIN_GAIN = 0.5  # gain [standard errors] that the first level must exceed; 0 for later levels
 FEW_ROWS_GAIN = 18.0  # additional gain [standard errors] of every level, times the number of rows
 MANY_ROWS = 10  # rows below which a fit may look good by chance, so that OPEN_SHARE applies as well
 CLEAR_SHARE = 0.7  # greatest error with another base and tool for few rows, as a share of the file's
 OPEN_SHARE = 0.5  # greatest deviation of the tip after a fit to few rows, as a share of the file's error
-CAP = 4.0  # greatest error [medians] that counts, so that a single wrong row does not decide
+ERROR_CAP = 4.0  # greatest error [medians] that counts, so that a single wrong row does not decide
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ def choose_level(
     tick: Callable[[int, int], object] | None = None,
 ) -> Choice:
     """The level that the rows justify, fitted to all of them; tick: called with the fits done, and their number."""
-    free_sets = [free_at(model, level, rows, fixed) for level in range(len(LEVELS))]
+    free_sets = [free_indices_at(model, level, rows, fixed) for level in range(len(LEVELS))]
     fits, errors = _cross_validate(model, rows, free_sets, tick or (lambda done, of: None))
     level, is_certain = 0, False  # whether the level is better than the file by more than chance
     for candidate in range(1, len(LEVELS)):
@@ -54,40 +54,43 @@ def choose_level(
         is_better = _is_better(errors[level], errors[candidate], first=not is_certain)
         if not is_better and not (candidate == 1 and _is_clearly_better(errors)):
             continue
-        if len(rows) >= MANY_ROWS or _is_settled(model, fits[candidate], errors[0]):
+        if len(rows) >= MANY_ROWS or _determines_tip(model, fits[candidate], errors[0]):
             level, is_certain = candidate, is_better
     return Choice(level, errors, fits[level])
 
 
 def _cross_validate(
-    model: Model, rows: Measurements, sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
+    model: Model, rows: Measurements, free_sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
 ) -> tuple[list[Fit], Array]:
     """Fits of every level to all rows, and the error of each row when it was left out: (levels, N) [mm].
 
-    sets: numbers of the parameters that are free at each level.
+    free_sets: numbers of the parameters that are free at each level.
     """
     parts = _five_parts(len(rows))
-    errors = np.empty((len(sets), len(rows)))
+    errors = np.empty((len(free_sets), len(rows)))
     fits: list[Fit] = []
     count = 1 + len(parts)
-    for level, free in enumerate(sets):
-        if level and np.array_equal(free, sets[level - 1]):
+    for level, free_indices in enumerate(free_sets):
+        if level and np.array_equal(free_indices, free_sets[level - 1]):
             errors[level] = errors[level - 1]
             fits.append(fits[-1])
             continue
         # every level starts from the previous fit to all rows, because that has about the right base
-        start = fits[-1].p if fits else None
-        full_fit = fit_corrections(model, rows, free, start)
+        start = fits[-1].corrections if fits else None
+        full_fit = fit_corrections(model, rows, free_indices, start)
         fits.append(full_fit)
         for part, test_rows in enumerate(parts):
-            tick(level * count + part + 1, len(sets) * count)
+            tick(level * count + part + 1, len(free_sets) * count)
             training_rows = np.setdiff1d(np.arange(len(rows)), test_rows)
-            p = fit_corrections(model, rows.take(training_rows), free, start, steps=12).p if len(free) else full_fit.p
-            errors[level, test_rows] = np.linalg.norm(residuals(model, p, rows.take(test_rows)).position, axis=1)
+            training_fit = full_fit
+            if len(free_indices):
+                training_fit = fit_corrections(model, rows.take(training_rows), free_indices, start, steps=12)
+            test_residuals = residuals(model, training_fit.corrections, rows.take(test_rows))
+            errors[level, test_rows] = np.linalg.norm(test_residuals.position, axis=1)
     return fits, errors
 
 
-def free_at(model: Model, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
+def free_indices_at(model: Model, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level, of its own kind and those of simpler levels."""
     kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
 
@@ -105,9 +108,9 @@ def _five_parts(count: int) -> list[NDArray[np.intp]]:
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
 
 
-def _is_settled(model: Model, candidate: Fit, before: Array) -> bool:
+def _determines_tip(model: Model, candidate: Fit, before: Array) -> bool:
     """Whether the deviation of the tip after the fit is less than OPEN_SHARE times the error of the file."""
-    return left_open(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(before**2)))
+    return tip_deviation(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(before**2)))
 
 
 def _is_clearly_better(errors: Array) -> bool:
@@ -121,8 +124,8 @@ def _is_better(simple: Array, rich: Array, *, first: bool) -> bool:
 
     The first level above the file needs a clear gain. For later levels the prior prevents overfitting.
     """
-    a, b = (np.minimum(errors, CAP * np.median(errors)) ** 2 for errors in (simple, rich))
+    a, b = (np.minimum(errors, ERROR_CAP * np.median(errors)) ** 2 for errors in (simple, rich))
     gain = a - b
     chance = float(gain.std(ddof=1) / np.sqrt(len(gain)))
-    share, least = (GAIN, CERTAIN_GAIN) if first else (1.0, 0.0)
+    share, least = (FIRST_ERROR_SHARE, CERTAIN_GAIN) if first else (1.0, 0.0)
     return bool(b.mean() <= share * a.mean() and gain.mean() > (least + FEW_ROWS_GAIN / len(gain)) * chance)

@@ -23,28 +23,28 @@ STEPS = 40  # most steps of a fit
 class Measurements:
     """Commanded joint values and measured tips."""
 
-    c: Array  # (M, n) [rad | mm]
+    commanded: Array  # (M, n) [rad | mm]
     position: Array  # (M, 3) [mm]
     rotation: Array | None = None  # (M, 3, 3)
 
     def __len__(self) -> int:
-        return len(self.c)
+        return len(self.commanded)
 
     def take(self, selected: NDArray[np.intp] | NDArray[np.bool_]) -> Measurements:
         """Some of the rows."""
         rotation = None if self.rotation is None else self.rotation[selected]
-        return Measurements(self.c[selected], self.position[selected], rotation)
+        return Measurements(self.commanded[selected], self.position[selected], rotation)
 
 
 @dataclass(frozen=True, eq=False)
 class Fit:
     """Corrections that fit some rows."""
 
-    p: Array  # (P,)
+    corrections: Array  # (P,)
     scale: tuple[float, float]  # [mm, rad] of the measurements' noise, each component
     weights: Array  # (M,) in [0, 1]
     normal: Array  # (F, F) normal matrix of the free parameters, prior included, in units of the prior
-    free: NDArray[np.intp]  # (F,)
+    free_indices: NDArray[np.intp]  # (F,) of the corrections that were fitted
 
 
 class Residuals(NamedTuple):
@@ -55,9 +55,9 @@ class Residuals(NamedTuple):
     jacobian: Array  # (M, 6, P)
 
 
-def residuals(model: Model, p: Array, rows: Measurements) -> Residuals:
-    """The residuals of the model with corrections p (P,)."""
-    T, J = model.poses(p, rows.c)
+def residuals(model: Model, corrections: Array, rows: Measurements) -> Residuals:
+    """The residuals of the model with corrections (P,)."""
+    T, J = model.poses(corrections, rows.commanded)
     position_residuals = rows.position - T[:, :3, 3]
     if rows.rotation is None:
         return Residuals(position_residuals, None, J)
@@ -69,41 +69,41 @@ def residuals(model: Model, p: Array, rows: Measurements) -> Residuals:
 def fit_corrections(
     model: Model,
     rows: Measurements,
-    free: NDArray[np.intp],
+    free_indices: NDArray[np.intp],
     start: Array | None = None,
     steps: int = STEPS,
 ) -> Fit:
-    """The best fit of the free parameters; the others stay at `start` (0)."""
-    p = np.zeros(len(model.parameters)) if start is None else start.copy()
-    prior = model.prior[free]
+    """The best fit of the parameters of `free_indices`; the others stay at `start` (0)."""
+    corrections = np.zeros(len(model.parameters)) if start is None else start.copy()
+    prior = model.prior[free_indices]
     damping = 1e-3
-    current = residuals(model, p, rows)
-    fitted_numbers = 0.0  # effective number of fitted parameters
-    for step in range(steps):
-        scale = scales(current.position, current.turn, fitted_numbers)
-        H, g = _normal_equations(current, scale, free, prior)
-        z = p[free] / prior
+    current = residuals(model, corrections, rows)
+    fitted_count = 0.0  # effective number of fitted parameters
+    for iteration in range(steps):
+        scale = scales(current.position, current.turn, fitted_count)
+        H, right_side = _normal_equations(current, scale, free_indices, prior)
+        z = corrections[free_indices] / prior  # in units of the prior
         cost = _cost(current, scale, z)
-        with_prior = H + np.eye(len(free))
-        fitted_numbers = float(np.trace(np.linalg.solve(with_prior, H))) if len(free) else 0.0
+        with_prior = H + np.eye(len(free_indices))
+        fitted_count = float(np.trace(np.linalg.solve(with_prior, H))) if len(free_indices) else 0.0
         for _ in range(8):
-            move = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), g - z)
-            trial_p = p.copy()
-            trial_p[free] += move * prior
-            trial_residuals = residuals(model, trial_p, rows)
-            if _cost(trial_residuals, scale, z + move) <= cost:
+            z_step = np.linalg.solve(with_prior + damping * np.diag(np.diag(H)), right_side - z)
+            trial_corrections = corrections.copy()
+            trial_corrections[free_indices] += z_step * prior
+            trial_residuals = residuals(model, trial_corrections, rows)
+            if _cost(trial_residuals, scale, z + z_step) <= cost:
                 break
             damping = max(damping, 1e-6) * 10
         else:
             break  # no step lowers the cost
-        p, current = trial_p, trial_residuals
+        corrections, current = trial_corrections, trial_residuals
         damping *= 0.1
-        if np.abs(move).max(initial=0.0) < 1e-5 and step > 3:
+        if np.abs(z_step).max(initial=0.0) < 1e-5 and iteration > 3:
             break
-    scale = scales(current.position, current.turn, fitted_numbers)
-    H, _ = _normal_equations(current, scale, free, prior)
+    scale = scales(current.position, current.turn, fitted_count)
+    H, _ = _normal_equations(current, scale, free_indices, prior)
     row_weights = np.minimum(weights(current.position, scale[0]), weights(current.turn, scale[1]))
-    return Fit(p, scale, row_weights, H + np.eye(len(free)), free)
+    return Fit(corrections, scale, row_weights, H + np.eye(len(free_indices)), free_indices)
 
 
 def _cost(current: Residuals, scale: tuple[float, float], z: Array) -> float:
@@ -113,10 +113,10 @@ def _cost(current: Residuals, scale: tuple[float, float], z: Array) -> float:
 
 
 def _normal_equations(
-    current: Residuals, scale: tuple[float, float], free: NDArray[np.intp], prior: Array
+    current: Residuals, scale: tuple[float, float], free_indices: NDArray[np.intp], prior: Array
 ) -> tuple[Array, Array]:
     """J^T W J and J^T W r of the free parameters, in units of the prior and the scales, without the prior."""
-    J = current.jacobian[:, :, free] * prior
+    J = current.jacobian[:, :, free_indices] * prior
     A, b = _weighted_equations(J[:, :3], current.position, scale[0])
     if current.turn is not None:
         A_turn, b_turn = _weighted_equations(J[:, 3:], current.turn, scale[1])
