@@ -1,6 +1,7 @@
 """`armkin.compile`: the formulas of an arm as machine code, compiled on this computer.
 
 compiled_arm.py      `compile`, and the compiled arm
+compiled_task.py     the library of one arm and task, and its calls with arrays
 joint_functions.py   poses, positions and clearances of joint values
 one_target.py        one target at a time, in microseconds
 elimination_rows.py  branches of an elimination in C, for targets on an edge that Python examines
