@@ -47,13 +47,13 @@ def _head_lines(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     return lines + list(dict.fromkeys(ends))  # several branches end there for one reason
 
 
-def _clearance_text(near: dict[str, Any]) -> str:
+def _clearance_text(nearest: dict[str, Any]) -> str:
     """Where the arm comes nearest to a keep-out."""
-    free = near["mm"]
-    if free is not None and free < 0:
-        return f"  at {near['s_mm']:.3f} mm: {near['body']} inside {near['with']}, {-free:.1f} mm deep"
-    size = "nothing counts" if free is None else f"at least {free:.1f} mm"
-    return f"  at {near['s_mm']:.3f} mm: {near['body']} nearest to {near['with']}, {size}"
+    clearance = nearest["mm"]
+    if clearance is not None and clearance < 0:
+        return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} inside {nearest['with']}, {-clearance:.1f} mm deep"
+    size = "nothing counts" if clearance is None else f"at least {clearance:.1f} mm"
+    return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} nearest to {nearest['with']}, {size}"
 
 
 def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:

@@ -91,10 +91,10 @@ def whole_arm(arm: Arm, q: Array) -> tuple[Arm, Array]:
 def hits_nothing(arm: Arm, q: Array) -> NDArray[np.bool_]:
     """Which postures hit nothing: q (..., n) [rad | mm] -> (...,); False for rows with nan."""
     full_arm, full_q = whole_arm(arm, q.reshape(-1, arm.n))
-    free: NDArray[np.bool_] = np.asarray(np.isfinite(full_q).all(axis=1))
+    is_free: NDArray[np.bool_] = np.asarray(np.isfinite(full_q).all(axis=1))
     if full_arm.keep_out:
-        free[free] = _guard(full_arm).least_clearances(full_q[free])[0] >= 0.0
-    return free.reshape(q.shape[:-1])
+        is_free[is_free] = _guard(full_arm).least_clearances(full_q[is_free])[0] >= 0.0
+    return is_free.reshape(q.shape[:-1])
 
 
 def hits(arm: Arm, q: Array) -> list[tuple[float | None, list[Hit]]]:

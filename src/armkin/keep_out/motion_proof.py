@@ -92,8 +92,8 @@ def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
     gaps = guard.clearances(q[samples])
     for stride in (*_STRIDES[1:], 0):
         hit[samples] = (gaps < 0).any(axis=1)
-        free = (gaps[:-1] + gaps[1:] >= (length[samples[1:]] - length[samples[:-1]]) @ lever).all(axis=1)
-        rows = np.flatnonzero(~free & (np.diff(samples) > 1))
+        is_free = (gaps[:-1] + gaps[1:] >= (length[samples[1:]] - length[samples[:-1]]) @ lever).all(axis=1)
+        rows = np.flatnonzero(~is_free & (np.diff(samples) > 1))
         if not stride or not len(rows):
             break
         added = np.concatenate([np.arange(samples[row] + stride, samples[row + 1], stride) for row in rows])

@@ -44,19 +44,19 @@ def lock(arm: Arm, held: Mapping[str, float]) -> Arm:
     ('J1', 'J2', 'J4', 'J5', 'J6', 'J7')
     """
     _check_held(arm, held)
-    free = [i for i, name in enumerate(arm.joint_names) if name not in held]
+    kept_joints = [i for i, name in enumerate(arm.joint_names) if name not in held]
     return replace(
         arm,
-        joint_names=tuple(arm.joint_names[i] for i in free),
+        joint_names=tuple(arm.joint_names[i] for i in kept_joints),
         link=_links_with_held_motions(arm, held),
-        frame=arm.frame[free],
-        motor_gain=arm.motor_gain[:, free],
-        pose_joints=arm.pose_joints[:, free],
-        homing=tuple(arm.homing[i] for i in free),
-        hard_limits=tuple(arm.hard_limits[i] for i in free),
+        frame=arm.frame[kept_joints],
+        motor_gain=arm.motor_gain[:, kept_joints],
+        pose_joints=arm.pose_joints[:, kept_joints],
+        homing=tuple(arm.homing[i] for i in kept_joints),
+        hard_limits=tuple(arm.hard_limits[i] for i in kept_joints),
         held=(*arm.held, *held),
         whole=(arm, dict(held)) if arm.keep_out else None,
-        **{field: getattr(arm, field)[free] for field in _JOINT_ARRAYS},
+        **{field: getattr(arm, field)[kept_joints] for field in _JOINT_ARRAYS},
     )
 
 

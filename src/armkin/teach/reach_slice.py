@@ -34,57 +34,59 @@ def reach_slice(arm: Arm) -> dict[str, Any]:
     Raises UsageError for an arm without a task of its own.
     """
     real_arm = actual_arm(arm)
-    free = redundancy(real_arm, None)
+    redundant = redundancy(real_arm, None)
     step = arm.reach / VOXELS_ACROSS
-    if free is None:  # azimuths 0 and 180 degrees alone: the plane
+    if redundant is None:  # azimuths 0 and 180 degrees alone: the plane
         reach_map = reach(arm, grid=step, azimuths=2, directions=DIRECTION_COUNT, rolls=1, measures=False)
         grid, shares, values = reach_map.grid, reach_map.columns["share"], 0
     else:
         grid = Grid(arm=real_arm, step=step, azimuths=2, directions=DIRECTION_COUNT, rolls=1, tool_down=False)
-        values_held = _held_values(real_arm, free)
-        shares, values = _reached_shares(grid, free, values_held), len(values_held)
+        values_held = _held_values(real_arm, redundant)
+        shares, values = _reached_shares(grid, redundant, values_held), len(values_held)
     plane = voxels.section_layer(grid)
     share = shares[plane.row]
-    reached = share > 0
+    is_reached = share > 0
     return {
         "size": grid.step,
         "frame": grid.frame.tolist(),
-        "centres": plane.centres[reached].round(3).ravel().tolist(),
-        "shares": share[reached].round(4).tolist(),
+        "centres": plane.centres[is_reached].round(3).ravel().tolist(),
+        "shares": share[is_reached].round(4).tolist(),
         "of": grid.orientations,
-        "held": None if free is None else arm.joint_names[free.joint],
+        "held": None if redundant is None else arm.joint_names[redundant.joint],
         "values": values,
     }
 
 
-def _held_values(arm: Arm, free: Redundancy) -> Array:
+def _held_values(arm: Arm, redundant: Redundancy) -> Array:
     """Values of the redundant joint to test [rad], home first."""
-    low, high, home = (float(limit[free.joint]) for limit in (arm.lower, arm.upper, arm.home))
-    if not free.by_formula:
+    low, high, home = (float(limit[redundant.joint]) for limit in (arm.lower, arm.upper, arm.home))
+    if not redundant.by_formula:
         return np.array([home])
     low, high = (low if np.isfinite(low) else home - np.pi), (high if np.isfinite(high) else home + np.pi)
     return np.append(home, np.linspace(low, high, VALUE_COUNT - 1))
 
 
-def _reached_shares(grid: Grid, free: Redundancy, values: Array) -> Array:
+def _reached_shares(grid: Grid, redundant: Redundancy, values: Array) -> Array:
     """The share of each cell's orientations that are reached without a hit at one of the values."""
-    arm, joint = grid.arm, free.joint
+    arm, joint = grid.arm, redundant.joint
     M, count = grid.azimuths, grid.orientations
     centres = np.repeat(grid.rings, M * count, axis=0)
     azimuth = np.tile(np.repeat(np.arange(M) * (2 * np.pi / M), count), len(grid.rings))
     target = grid.targets(centres, azimuth, np.arange(len(centres)) % count, np.zeros(len(centres)))
-    reached = np.zeros(len(target), bool)
-    near_enough = distance(arm, free.task, target) <= 1.0
+    is_reached = np.zeros(len(target), bool)
+    near_enough = distance(arm, redundant.task, target) <= 1.0
     for value in values:
-        unreached = np.flatnonzero(near_enough & ~reached)
-        s = ik(
-            free.rest,
-            move_targets(arm, free, target[unreached], np.full(len(unreached), value)),
-            free.task.name,
+        unreached = np.flatnonzero(near_enough & ~is_reached)
+        solutions = ik(
+            redundant.rest,
+            move_targets(arm, redundant, target[unreached], np.full(len(unreached), value)),
+            redundant.task.name,
             examine=False,
         )
-        legal = s.within_limits
+        is_legal = solutions.within_limits
         if arm.keep_out:
-            legal = legal & hits_nothing(arm, np.insert(np.where(legal[:, :, None], s.q, np.nan), joint, value, axis=2))
-        reached[unreached] = legal.any(axis=1)
-    return np.asarray(reached.reshape(-1, count).mean(axis=1))
+            is_legal = is_legal & hits_nothing(
+                arm, np.insert(np.where(is_legal[:, :, None], solutions.q, np.nan), joint, value, axis=2)
+            )
+        is_reached[unreached] = is_legal.any(axis=1)
+    return np.asarray(is_reached.reshape(-1, count).mean(axis=1))

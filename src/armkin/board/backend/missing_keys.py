@@ -75,12 +75,12 @@ def _without_rates(arm: Arm, board: bool) -> list[Lack]:
 def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
     """Lines with a stepper for each joint without a motor; board: with an axis of its own."""
     axes = list(_axis_names(arm)) if board else []
-    used = {motor.axis for motor in arm.motors}
-    free = iter([axis for axis in axes if axis not in used])
+    used_axes = {motor.axis for motor in arm.motors}
+    free_axes = iter([axis for axis in axes if axis not in used_axes])
     groups: dict[str, list[str]] = {}
     for name in joints:
         lead = ", lead: 8" if arm.prismatic[arm.joint_names.index(name)] else ""
-        axis = next(free, None)
+        axis = next(free_axes, None)
         axis_key = "" if axis is None else f"axis: {axis}, "
         groups.setdefault(f"drive: {{{axis_key}full_steps: 200, microsteps: 16{lead}}}", []).append(name)
     return [f"{drive}   # for example; {_to_joints(names)}" for drive, names in groups.items()]

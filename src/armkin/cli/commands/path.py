@@ -120,9 +120,11 @@ def path(
 
     arm = keep_outs.load_moving_arm(robot, scene, ignore_keep_out, tool)
     locked = lock_and_sweep.locked_radians(arm, lock)
-    free = armkin.lock(arm, locked) if locked else arm
-    drawn = drawing_path.drawing_moves(free, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
-    moves = _moves_of(free, file, via, task) if drawn is None else drawn
+    locked_arm = armkin.lock(arm, locked) if locked else arm
+    drawn = drawing_path.drawing_moves(
+        locked_arm, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by
+    )
+    moves = _moves_of(locked_arm, file, via, task) if drawn is None else drawn
     output.check_destination(out, "a plan is", ".csv")
     options: dict[str, Any] = {
         "branch": branch,

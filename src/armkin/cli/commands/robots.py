@@ -58,8 +58,8 @@ def _task_and_target(arm: Any) -> tuple[str | None, list[str], list[str]]:
         task = task_for(arm)
     except UsageError as error:
         return None, [], [str(error)]
-    free = arm.n - task.constraints  # with one joint to spare ik lists families; with more it asks for held ones
-    return task.name, list(task.labels), [f"hold {free} joints with --lock"] if free > 1 else []
+    surplus = arm.n - task.constraints  # with one joint to spare ik lists families; with more it asks for held ones
+    return task.name, list(task.labels), [f"hold {surplus} joints with --lock"] if surplus > 1 else []
 
 
 def _text(robots: list[ShippedRobot]) -> str:

@@ -39,8 +39,9 @@ def candidates_code(
     values, miss = outputs[:n], outputs[n]
     stores = [f"q[{b * n + j} * ARM_LANES + i] = {values[j][b]};" for b in range(len(miss)) for j in range(n)]
     stores += [f"miss[{b} * ARM_LANES + i] = {miss[b]};" for b in range(len(miss))]
-    edge, *free = map(_any_true, code.outputs[n + 1 :])
-    stores.append(f"doubt[i] = {edge or 0};" if not free or not free[0] else f"doubt[i] = ({edge}) | ({free[0]}) * 2;")
+    edge, *joint_is_free = map(_any_true, code.outputs[n + 1 :])
+    doubt = f"({edge}) | ({joint_is_free[0]}) * 2" if joint_is_free and joint_is_free[0] else edge or "0"
+    stores.append(f"doubt[i] = {doubt};")
     head = (
         "static void arm_candidates(const arm_real *ARM_RESTRICT goal, const arm_real *ARM_RESTRICT near,\n"
         "    arm_real *ARM_RESTRICT q, arm_real *ARM_RESTRICT miss, int *ARM_RESTRICT doubt, int count)"

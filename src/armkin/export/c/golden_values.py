@@ -58,10 +58,10 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
 
 def _solve_branches(arm: Arm, task: Task, target: Array) -> tuple[Array, Bool, NDArray[np.int8]]:
     """Branches (N, B, n), which are there and their indices (N, B), a redundant joint held at home."""
-    spare = redundancy(actual_arm(arm), task.name)
+    redundant = redundancy(actual_arm(arm), task.name)
     held = {}
-    if spare is not None and not spare.about_tool_axis:
-        held = {arm.joint_names[spare.joint]: float(arm.home[spare.joint])}
+    if redundant is not None and not redundant.about_tool_axis:
+        held = {arm.joint_names[redundant.joint]: float(arm.home[redundant.joint])}
     solutions = ik(lock(arm, held) if held else arm, target, task.name)
     return unlock(arm, held, solutions.q), solutions.valid, solutions.branch
 
@@ -78,8 +78,8 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
     low = np.where(np.isfinite(arm.lower), np.maximum(arm.lower, -turn), -turn)
     high = np.where(np.isfinite(arm.upper), np.minimum(arm.upper, turn), turn)
     q = rng.uniform(low, high, (50 * count, arm.n))
-    if spare := redundancy(actual_arm(arm), task.name):
-        q[:, spare.joint] = arm.home[spare.joint]
+    if redundant := redundancy(actual_arm(arm), task.name):
+        q[:, redundant.joint] = arm.home[redundant.joint]
     branches, valid, _ = _solve_branches(arm, task, targets_of(task, fk(arm, q), q))
     sigma = _least_singular_values(arm, task, branches, valid)
     order = np.argsort(-np.minimum(sigma, _CLEAR), kind="stable")  # clear ones as they come, then the next best

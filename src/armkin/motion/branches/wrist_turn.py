@@ -196,16 +196,16 @@ def _window_with_offset(arm: Arm, route: Route, window: Window) -> Window | None
     if len(crossings) != 1:
         return None
     i = int(crossings[0])
-    f = float(volumes[i] / (volumes[i] - volumes[i + 1]))
-    posture, length = q[i] + f * (q[i + 1] - q[i]), float(s[i] + f * (s[i + 1] - s[i]))
-    free = [0, 1, 2, 3, 5]
+    fraction = float(volumes[i] / (volumes[i] - volumes[i + 1]))
+    posture, length = q[i] + fraction * (q[i + 1] - q[i]), float(s[i] + fraction * (s[i + 1] - s[i]))
+    free_joints = [0, 1, 2, 3, 5]
     for _ in range(_NEWTON_STEPS):  # keep the direction, then move the tip close; joint 5 stays straight
         target, next_target = route.targets(np.array([length, length + _SLOPE_STEP]))
         tangent = (next_target - target)[:3, 3] / _SLOPE_STEP
-        T, J = fk(arm, posture), jacobian(arm, posture)[:, free]
+        T, J = fk(arm, posture), jacobian(arm, posture)[:, free_joints]
         displacement = T[:3, 3] - target[:3, 3]
         miss = np.concatenate([-_MIN_WEIGHT * displacement, _small_turns(T, target)])
-        posture[free] += np.linalg.lstsq(np.concatenate([_MIN_WEIGHT * J[:3], J[3:]]), miss, rcond=1e-9)[0]
+        posture[free_joints] += np.linalg.lstsq(np.concatenate([_MIN_WEIGHT * J[:3], J[3:]]), miss, rcond=1e-9)[0]
         length += float(displacement @ tangent)  # the part along the path is no detour
     return replace(window, turned=0.0, detour=Detour(window.begin, window.end, displacement))
 

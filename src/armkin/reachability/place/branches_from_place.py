@@ -24,19 +24,19 @@ if TYPE_CHECKING:
 MAX_TURN = 0.5 * math.pi  # turn [rad] of a joint between targets from which on a branch is interrupted
 
 
-def branch_ranges(s: Solutions, free: Bool) -> tuple[Bool, Array, Array]:
+def branch_ranges(solutions: Solutions, is_free: Bool) -> tuple[Bool, Array, Array]:
     """Which branches follow all targets (B,), and their least and greatest joint values (B, n), whatever the limits.
 
-    s: answers to the targets in their order (S, ...); free: (S, B) which postures hit nothing.
+    solutions: of the targets in their order (S, ...); is_free: (S, B) which postures hit nothing.
     """
-    number = s.branch  # a branch keeps its number along a path
-    S, B, n = s.q.shape
+    number = solutions.branch  # a branch keeps its number along a path
+    S, B, n = solutions.q.shape
     values = np.full((S, max(B, int(number.max(initial=-1)) + 1), n), np.nan)
-    is_usable = s.valid & free & (number >= 0)
+    is_usable = solutions.valid & is_free & (number >= 0)
     row = np.broadcast_to(np.arange(S)[:, None], (S, B))
-    values[row[is_usable], number[is_usable]] = s.q[is_usable]
+    values[row[is_usable], number[is_usable]] = solutions.q[is_usable]
     step = np.diff(values, axis=0)
-    revolute = ~s.arm.prismatic
+    revolute = ~solutions.arm.prismatic
     step[:, :, revolute] -= TURN * np.rint(step[:, :, revolute] / TURN)
     with np.errstate(invalid="ignore"):
         is_complete = np.asarray(

@@ -317,8 +317,8 @@ def _on_one_branch(question: PlaceQuestion, position: Array, yaws: NDArray[np.bo
         return np.asarray(yaws & is_on_arc.any(axis=0))
     is_followed = np.zeros(K, bool)
     for k in np.flatnonzero(yaws).tolist():
-        solutions, free = free_from(question, position, k * question.step, legal_only=False)
-        is_complete, low, high = branches_from_place.branch_ranges(solutions, free)
+        solutions, is_free = free_from(question, position, k * question.step, legal_only=False)
+        is_complete, low, high = branches_from_place.branch_ranges(solutions, is_free)
         is_followed[k] = (is_complete & branches_from_place.some_copy_legal(arm, low, high, range(arm.n))).any()
     return is_followed
 
@@ -334,15 +334,16 @@ def free_from(
     """The branches of all targets from one place, and which hit nothing (N, B), with legal_only also within limits."""
     # following a path needs isolated branches, while any posture of a family reaches a target
     solve = question.solve if legal_only else isolated_branches
-    s = solve(question.arm, targets_from(question, position, turn), question.task.name)
-    legal = s.within_limits if legal_only else s.valid
+    solutions = solve(question.arm, targets_from(question, position, turn), question.task.name)
+    is_legal = solutions.within_limits if legal_only else solutions.valid
     if question.arm.keep_out:
-        legal = legal & s.clear
-    if question.obstacles.keep_out and legal.any():
-        place, q = ((float(position[0]), float(position[1]), question.z), np.where(legal[:, :, None], s.q, np.nan))
+        is_legal = is_legal & solutions.clear
+    if question.obstacles.keep_out and is_legal.any():
+        place = float(position[0]), float(position[1]), question.z
+        q = np.where(is_legal[:, :, None], solutions.q, np.nan)
         arm, joints = question.full_arm or HeldArm(question.arm, {})
-        legal = legal & free_at_place(arm, question.obstacles, place, turn, unlock(arm, joints, q))
-    return s, np.asarray(legal)
+        is_legal = is_legal & free_at_place(arm, question.obstacles, place, turn, unlock(arm, joints, q))
+    return solutions, np.asarray(is_legal)
 
 
 def targets_from(question: PlaceQuestion, position: Array, turn: float) -> Array:
