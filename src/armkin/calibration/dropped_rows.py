@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 
 K = 4.0  # residuals beyond K scales lose three quarters of their weight
 MEDIAN_NORM = 1.5382  # median of the length of three standard normal numbers
-MIN_SCALES = 0.005, 1e-5  # smallest scale [mm, rad], about the last digit of a measurement
+MIN_POSITION_SCALE, MIN_ROTATION_SCALE = 0.005, 1e-5  # [mm], [rad], about the last digit of a measurement
 DROPPED_WEIGHT = 0.1  # weight below which a row is reported as dropped
 
 
@@ -40,7 +40,7 @@ def scales(position_residuals: Array, rotation_residuals: Array | None, fitted_c
         if rotation_residuals is None
         else float(np.median(np.linalg.norm(rotation_residuals, axis=1))) / MEDIAN_NORM * correction
     )
-    return max(position_scale, MIN_SCALES[0]), max(rotation_scale, MIN_SCALES[1])
+    return max(position_scale, MIN_POSITION_SCALE), max(rotation_scale, MIN_ROTATION_SCALE)
 
 
 def dropped_row_numbers(weights: Array) -> NDArray[np.intp]:

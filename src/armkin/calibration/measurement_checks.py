@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 MIN_ROWS = 4  # fewest rows of a measurement
-STILL_MOVEMENT = math.radians(0.1), 0.1  # movement [rad, mm] below which a joint counts as not moving
+STILL_TURN, STILL_SLIDE = math.radians(0.1), 0.1  # movement [rad], [mm] below which a joint counts as not moving
 LINE_THICKNESS = 0.01  # thickness of a cloud, as a share of its length, below which its points are on a line
 FIT_SHARE = 0.1  # error, as a share of the points' spread, below which no other reading is tried
 EXPLAINED_SHARE = 0.35  # share of the error that another reading must not exceed to be the explanation
@@ -37,7 +37,7 @@ def check_measurements(arm: Arm, data_rows: Measurements) -> None:
 
 def _check_motion(arm: Arm, rows: Measurements) -> None:
     """Raise UsageError if a joint never moves, or all of them in step."""
-    thresholds = np.where(arm.prismatic, STILL_MOVEMENT[1], STILL_MOVEMENT[0])
+    thresholds = np.where(arm.prismatic, STILL_SLIDE, STILL_TURN)
     motionless = np.flatnonzero(np.ptp(rows.commanded, axis=0) < thresholds)
     if len(motionless):
         names = ", ".join(arm.joint_names[j] for j in motionless)

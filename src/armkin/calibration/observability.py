@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.calibration.corrected_chain import Model
-from armkin.calibration.dropped_rows import MIN_SCALES
+from armkin.calibration.dropped_rows import MIN_POSITION_SCALE
 from armkin.calibration.robust_fit import Fit
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 UNSEEN_SHARE = 0.7  # remaining share of the prior's deviation above which the rows do not determine a correction
 SUM_CORRELATION = 0.9  # correlation of two corrections above which only their sum is determined
 CANDIDATE_COUNT = 400  # random postures from which the next ones to measure are chosen
-UNLIMITED_RANGE = np.pi, 200.0  # range [rad, mm] to each side of an unlimited joint for suggestions
+UNLIMITED_TURN, UNLIMITED_SLIDE = np.pi, 200.0  # range [rad], [mm] to each side of an unlimited joint
 
 
 def correction_deviations(model: Model, fit: Fit) -> Array:
@@ -92,7 +92,7 @@ def suggest_poses(model: Model, count: int, free_indices: NDArray[np.intp], meas
 
 def _joint_range(arm: Arm) -> tuple[Array, Array]:
     """Lower and upper limits (n,) [rad | mm]; half a turn or 200 mm to a side without a limit."""
-    span = np.where(arm.prismatic, UNLIMITED_RANGE[1], UNLIMITED_RANGE[0])
+    span = np.where(arm.prismatic, UNLIMITED_SLIDE, UNLIMITED_TURN)
     low = np.where(np.isfinite(arm.lower), arm.lower, np.where(np.isfinite(arm.upper), arm.upper - span, -span))
     return low, np.where(np.isfinite(arm.upper), arm.upper, np.where(np.isfinite(arm.lower), arm.lower + span, span))
 
@@ -105,4 +105,4 @@ def _random_poses(arm: Arm, count: int) -> Array:
 def _whitened_jacobian(model: Model, commanded: Array, free_indices: NDArray[np.intp]) -> Array:
     """Displacement of the tip by the corrections, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
     J = model.poses(np.zeros(len(model.parameters)), commanded)[1][:, :3, free_indices]
-    return np.asarray(J * model.prior[free_indices] / max(0.1, MIN_SCALES[0]))
+    return np.asarray(J * model.prior[free_indices] / max(0.1, MIN_POSITION_SCALE))

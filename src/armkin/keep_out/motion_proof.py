@@ -30,7 +30,8 @@ _FIRST = 16  # intervals at the start of a proof
 _AT_ONCE = 1024  # intervals halved together, the earliest first, so that an early hit ends the proof soon
 _MIN_SHARE = 1e-9  # share of a cell below which no interval is halved
 _STRIDES = (64, 8, 1)  # strides of the samples, from coarse to fine
-_GAPS = (0.5, 0.05)  # allowed gap between bound and least sampled clearance: [mm], share of the clearance
+_GAP = 0.5  # allowed gap [mm] between bound and least sampled clearance
+_GAP_SHARE = 0.05  # the same as a share of the clearance; the larger of both counts
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ class _Round:
         if tight and not len(rows) and self.hit == self.stuck == len(self.places):
             bounds = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
             lowest = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
-            rows = np.flatnonzero(bounds < lowest - max(_GAPS[0], _GAPS[1] * lowest)) if np.isfinite(lowest) else rows
+            rows = np.flatnonzero(bounds < lowest - max(_GAP, _GAP_SHARE * lowest)) if np.isfinite(lowest) else rows
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
         cell_end = np.round((low + high) / 2)  # an interval of several cells is split at the end of a cell

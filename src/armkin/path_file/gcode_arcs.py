@@ -5,7 +5,10 @@ import math
 from armkin.path_file.drawing import Point
 
 AXES = "XYZ"
-_OFF = (0.005, 0.001, 0.5)  # distances [mm], of the radius, [mm]: how far an arc's end may lie off its circle
+# an arc's end may lie off its circle by _MISS, or by _MISS_SHARE of the radius up to _MAX_MISS
+_MISS = 0.005  # [mm]
+_MISS_SHARE = 0.001  # [1] of the radius
+_MAX_MISS = 0.5  # [mm]
 
 
 class ArcError(ValueError):
@@ -26,7 +29,7 @@ def arc(
         raise ArcError(f"{word} P{turns:g}: turns are whole, 1 to 1000")
     centre = _centre(word, plane, values, unit, a, b)
     radius, miss = _radius(plane, centre, a, b)
-    if miss > _OFF[2] or (miss > _OFF[0] and miss > _OFF[1] * radius):
+    if miss > _MAX_MISS or (miss > _MISS and miss > _MISS_SHARE * radius):
         raise ArcError(f"{word} ends {miss:.4g} mm off its circle of {radius:.6g} mm")
     centre = _equalised_centre(plane, centre, a, b, miss)
     u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
@@ -88,7 +91,7 @@ def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point
     chord = math.hypot(dx, dy)
     if chord < 1e-9:
         raise ArcError(f"{word} with R begins where it ends: a whole circle needs I, J or K")
-    if chord > 2 * abs(r) * (1 + 1e-6) + 2 * _OFF[0]:
+    if chord > 2 * abs(r) * (1 + 1e-6) + 2 * _MISS:
         raise ArcError(f"{word} R{r:g} is shorter than half of its chord of {chord:.6g} mm")
     rise = math.sqrt(max(r * r - chord * chord / 4, 0.0)) * _sense(word) * (1 if r > 0 else -1)
     centre = list(a)

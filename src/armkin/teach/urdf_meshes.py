@@ -22,7 +22,8 @@ MAX_TRIANGLES = 18_000  # most triangles of an arm, 0.43 MB of a page
 _MAX_FILES = 200  # most mesh files of an arm
 _GRID_DIVISOR = 1000  # the finest grid of corners is the reach divided by this
 _GRID_FACTOR = 1.25  # factor from a grid to the next coarser one
-_AXIS_DIFFERENCE = 0.1, 1e-3  # largest difference [mm], [rad] between axes of the URDF and of the arm
+_AXIS_DISTANCE = 0.1  # largest distance [mm] between an axis of the URDF and of the arm
+_AXIS_ANGLE = 1e-3  # largest angle [rad] between them
 
 
 def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
@@ -116,7 +117,7 @@ def _matching_joints(arm: Arm, tree: Tree, first: str, joint_frames: list[Array]
                 if arm.prismatic[index]
                 else float(np.linalg.norm(offset - (offset @ joint_frame[:3, 2]) * joint_frame[:3, 2]))
             )
-            if distance > _AXIS_DIFFERENCE[0] or np.linalg.norm(z - joint_frame[:3, 2]) > _AXIS_DIFFERENCE[1]:
+            if distance > _AXIS_DISTANCE or np.linalg.norm(z - joint_frame[:3, 2]) > _AXIS_ANGLE:
                 mismatch = (
                     f"at joint values 0 the axis of its joint {joint.name} is not that of {arm.joint_names[index]}"
                 )

@@ -34,7 +34,7 @@ _RECKONED_SEGMENTS = 64  # segments whose transmission is simulated: both ramps 
 # Choices of segments in the first frames: a short first frame arrives early, longer ones keep the queue filled.
 _FIRST_BATCHES = ((1, 3, 3, 4, 4), (1, 4, 3, 6, 3), (1, 4, 4, 6, 3), (1, 5, 5, 6, 3), (1, 6))
 _FAR_ANSWER = 0.005  # slowest answer [s] at which a short move can wait for credit
-_BUSY_TIMES = 0.0003, 0.0005  # time [s] that the board needs for a frame, and for a segment
+_FRAME_TIME, _SEGMENT_TIME = 0.0003, 0.0005  # time [s] that the board needs for a frame, and for a segment
 _TICK_FACTOR = 2.2  # factor on these times while the arm moves
 _ACK_BYTES = 16  # size [bytes] of an answer
 
@@ -138,7 +138,7 @@ def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], un
         credit_time = queued[number - 2] + session.line.slowest + _ACK_BYTES * bit if number > 1 else 0.0
         line_free = max(line_free, credit_time) + size * bit
         work_start = max(line_free, queued[-1] if queued else 0.0)
-        work_end = work_start + _BUSY_TIMES[0] + segments * _BUSY_TIMES[1]
+        work_end = work_start + _FRAME_TIME + segments * _SEGMENT_TIME
         queued.append(
             work_end + (_TICK_FACTOR - 1) * max(0.0, work_end - max(work_start, motion_start)) if number else work_end
         )

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 PATH_DISTANCE = 2.0  # largest distance [steps] of a motor from the path; rounding is below 1
 LEAD_TIME = 0.3  # longest time [s] ahead of the plan
-CREEP_TIMES = 0.1, 3.0  # progress [s] in the plan, and time [s] for it, below which GRBL has stopped
+_PROGRESS_TIME = 0.1  # progress [s] in the plan that a moving GRBL makes within _CREEP_TIME
+_CREEP_TIME = 3.0  # [s]
 _WINDOW_POINTS = 250  # points of the path that are compared, 10 s
 
 
@@ -71,10 +72,10 @@ class Watch:
         )
 
     def _creep_fault(self, first: float, last: float, elapsed: float) -> str | None:
-        if last >= min(self._plan_time + CREEP_TIMES[0], float(self._times[-1])):
+        if last >= min(self._plan_time + _PROGRESS_TIME, float(self._times[-1])):
             self._plan_time, self._progress_time, self._pause = last, elapsed, 0.0
         self._pause = max(self._pause, last - first)
-        return "it hardly moves on" if elapsed - self._progress_time > CREEP_TIMES[1] + self._pause else None
+        return "it hardly moves on" if elapsed - self._progress_time > _CREEP_TIME + self._pause else None
 
     def _plan_times(self, counts: Array) -> tuple[float, float] | None:
         """First and last time in the plan at which the motors are at these counts; None: off the path."""

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 _MIN_GRID_POINTS = 1000  # fewest points of a route's grid
 _SAMPLE_STEP = 1.0  # largest distance [mm] between the first samples
-_SAMPLES = (200, 20_000)  # fewest and most samples of a route
+_SAMPLE_COUNTS = (200, 20_000)  # fewest and most samples of a route
 _MANY_RESTS = 8  # with more rests than this, the parts between them are planned in groups
 _CHUNK_SAMPLES = 8192  # samples of such a group
 _MAX_DISTANCE = 2.0  # largest distance [mm] between the samples of a route that needs more than the most
@@ -87,7 +87,8 @@ class CarriedRoute:
 
 def route_samples(route: Route, count: int | None = None) -> Array:
     """The lengths [mm] at which a route is solved first: evenly spaced, and the ends of its pieces."""
-    number = count or int(max(np.clip(np.ceil(route.length / _SAMPLE_STEP), *_SAMPLES), route.length / _MAX_DISTANCE))
+    sample_count = np.clip(np.ceil(route.length / _SAMPLE_STEP), *_SAMPLE_COUNTS)
+    number = count or int(max(sample_count, route.length / _MAX_DISTANCE))
     even_lengths = np.linspace(0.0, route.length, max(number, 2))
     return np.asarray(_drop_close_values(np.sort(np.concatenate([even_lengths, route.breaks])), 1e-7 * route.length))
 

@@ -24,7 +24,7 @@ _MAX_ROUNDS = 8  # most rounds of refinement
 _BLOCK_POINTS = 8192  # points evaluated in one call
 _COARSE_STEP = 0.05  # chord error [mm] that every interval keeps, if the tolerance is smaller
 _MIN_CHORD_TURN = 1.6  # with exact slopes, a chord that turns less than this [rad] may be longer
-_SECTION_POINTS = (4, 64)  # fewest points between two breaks, with many sections and with few
+_MIN_SECTION_POINTS, _MAX_SECTION_POINTS = 4, 64  # fewest points between two breaks, with many sections and with few
 _MIN_POINTS = 2  # fewest points of a section with exact slopes
 _GROWTH_RATIO = 2.5  # greatest ratio of neighbouring intervals: speed changes quickly near a bend
 _EXCESS_FACTOR = 1.3  # excess over that ratio that is not worth a division
@@ -60,7 +60,7 @@ def refine_grid(
     """
     route = branch.route
     exact = exact and len(route.spans) > 0 and not branch.windows
-    points, breaks = _initial_grid(arm, branch, number, _MIN_POINTS if exact else _SECTION_POINTS[0])
+    points, breaks = _initial_grid(arm, branch, number, _MIN_POINTS if exact else _MIN_SECTION_POINTS)
     if exact:
         points, breaks = _grade_grid(points, breaks)
     resting = _nearest_indices(points[breaks], branch.stops)
@@ -133,7 +133,7 @@ def _accumulate_motion(arm: Arm, q: Array) -> Array:
 def _min_counts(edges: Array, stops: Array, number: int, min_points: int) -> Int:
     """The least number of intervals (M,) of each section, so that enough lie between two stops, too."""
     sections = len(edges) - 1
-    min_count = np.full(sections, int(np.clip(2 * number / sections, min_points, _SECTION_POINTS[1])))
+    min_count = np.full(sections, int(np.clip(2 * number / sections, min_points, _MAX_SECTION_POINTS)))
     if not len(stops):
         return min_count
     part = np.searchsorted(stops, (edges[:-1] + edges[1:]) / 2)  # between which stops

@@ -37,10 +37,11 @@ _NO_STEP = 0.49  # part of a step that rounding of rates may use
 # A first segment without a step is shortened by this factor: its constant speed is that of 1.2 of the acceleration,
 # within the board's bound of 5/4. All steps come earlier by the same time.
 UNHEARD_SHARE = math.sqrt(1 / 2.4)  # share of its time
-_CRUISE_TIMES = (0.2, 0.4)  # shortest and longest cruise segment [s]
+_MIN_CRUISE_SEGMENT, _MAX_CRUISE_SEGMENT = 0.2, 0.4  # shortest and longest cruise segment [s]
 _JERK_TIME = 0.02  # longest segment [s] with a change of acceleration
 _SPLIT_TIME = 0.08  # shortest cruise segment [s] of which the end becomes a segment of its own
-_MIN_CRUISE = (0.03, 0.0006)  # shortest cruise, as share of a ramp and in [s]; else the ramps meet
+_CRUISE_SHARE = 0.03  # shortest cruise as a share of a ramp; below it, and below _MIN_CRUISE, the ramps meet
+_MIN_CRUISE = 0.0006  # [s]
 _MAKE_UP_SHARE = 0.01  # share of its travel that a motor may correct: the board allows 1.05 of its rate
 _SPARE_SHARE = 0.0005  # share of a piece's steps that is left for the next piece to correct
 _EAGER_SEGMENTS = 2000  # up to so many segments are computed at once
@@ -157,7 +158,7 @@ def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[floa
     """
     ramp = law.peak / max(law.accel, 1e-12)
     times = law.times.tolist()
-    if law.is_trapezoid and times[2] - times[1] < max(_MIN_CRUISE[0] * ramp, _MIN_CRUISE[1]):
+    if law.is_trapezoid and times[2] - times[1] < max(_CRUISE_SHARE * ramp, _MIN_CRUISE):
         times[1] = times[2] = (times[1] + times[2]) / 2
     for phase, (t0, t1) in enumerate(pairwise(times)):
         accel, jerk = float(law.states[phase, 2]), float(law.jerk[phase])
@@ -166,7 +167,7 @@ def _law_phases(law: Profile, steps: int, pieces: Pieces) -> Iterator[tuple[floa
         if jerk == 0.0 and accel != 0.0:
             yield t0, t1, _ramp_bounds(law, t0, t1, accel, steps, pieces)
             continue
-        max_time = _JERK_TIME if jerk else min(max(ramp / 8, _CRUISE_TIMES[0]), _CRUISE_TIMES[1])
+        max_time = _JERK_TIME if jerk else min(max(ramp / 8, _MIN_CRUISE_SEGMENT), _MAX_CRUISE_SEGMENT)
         parts = math.ceil((t1 - t0) / max_time)
         part_time = (t1 - t0) / parts
         if jerk or part_time < _SPLIT_TIME:

@@ -17,7 +17,7 @@ _RESEND_TIMEOUT = 0.03  # time [s] without progress, beyond the slowest answer, 
 _GAP_TIME = 0.004  # the same after a known loss
 _ASK_DELAY = 0.012  # time [s] without progress after which the status is requested
 _NOISY_RESEND = 0.002  # the same on a bad line, where waiting is useless
-_UNDER_WAY = 1, 16  # most unacknowledged frames, on a bad and on a good line
+_MAX_FRAMES = (1, 16)  # most unacknowledged frames, on a bad and on a good line
 _MAX_BYTES = (240, 700)  # most unacknowledged bytes, on a bad and on a good line
 QUESTION_BYTES = 12  # size [bytes] of a STATUS? on the line
 
@@ -120,7 +120,7 @@ class Window:
         """Send waiting frames as far as the board's credit, the window and its receive buffer have room."""
         credit = self._credit
         size = sum(len(frame_bytes) for _, frame_bytes in self._sent)
-        max_frames = _UNDER_WAY[0 if self._line.noisy else 1]
+        max_frames = _MAX_FRAMES[0 if self._line.noisy else 1]
         while self._waiting and len(self._sent) < max_frames:
             if self._waiting[0].segments > credit:
                 return
