@@ -66,7 +66,7 @@ MUTANTS = [
     Mutant("motion/timing/limit_jerk.py", "(2 * accel / np.asarray", "(accel / np.asarray", "motion"),
     Mutant("keep_out/motion_proof.py", "(clearances[:-1] + clearances[1:] - moved) / 2",
            "(clearances[:-1] + clearances[1:]) / 2", "keep_out"),
-    Mutant("motion/tool_path/path_pieces.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
+    Mutant("motion/tool_path/corner_blend.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
            "motion"),
     Mutant("path_file/svg_shapes.py", "0.0) if kind == \"skewX\" else", "0.0) if kind == \"skewY\" else", "path_file"),
     Mutant("board/grbl/trajectory_to_gcode.py", "max(60 * speed, MIN_FEED)", "max(speed, MIN_FEED)", "board"),

@@ -7,7 +7,8 @@ import numpy as np
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.motion.tool_path.path_pieces import Piece, Spot, line, split_target
+from armkin.motion.tool_path.path_pieces import Piece, Spot, split_target
+from armkin.motion.tool_path.piece_shapes import line
 
 
 def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:

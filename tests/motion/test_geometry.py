@@ -9,7 +9,9 @@ import pytest
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.motion.tool_path.path_pieces import arc, blend, line, rotation_matrices, split_target
+from armkin.motion.tool_path.corner_blend import blend
+from armkin.motion.tool_path.path_pieces import rotation_matrices, split_target
+from armkin.motion.tool_path.piece_shapes import arc, line
 
 TASK = task_for(armkin.load("three_dof"))
 

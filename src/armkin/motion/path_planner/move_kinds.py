@@ -10,7 +10,7 @@ import numpy as np
 
 from armkin.errors import UsageError
 from armkin.forward import fk
-from armkin.motion.tool_path import path_numbers, path_pieces
+from armkin.motion.tool_path import path_numbers, piece_shapes
 from armkin.motion.tool_path.dense_points import Polyline
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def _do_point(walk: Walk, move: Move, value: list[float]) -> None:
 def _add_line(walk: Walk, move: Move, value: list[float], inner: bool = False) -> None:
     corner = walk.corner_blend(move, inner)
     if corner is not None and walk.dense is None:
-        walk.add_piece(move, path_pieces.line(walk.task, walk.spot, walk.target(value)))
+        walk.add_piece(move, piece_shapes.line(walk.task, walk.spot, walk.target(value)))
         return
     _gather_points(walk, move, [value])
     if corner is not None:
@@ -66,7 +66,7 @@ def _gather_points(walk: Walk, move: Move, targets: list[list[float]]) -> None:
 
 def _add_arc(walk: Walk, move: Move, value: Any) -> None:
     via = path_numbers.coordinates(walk.task, value.via)
-    walk.add_piece(move, path_pieces.arc(walk.task, walk.spot, via, walk.target(value.to)))
+    walk.add_piece(move, piece_shapes.arc(walk.task, walk.spot, via, walk.target(value.to)))
 
 
 def _add_circle(walk: Walk, move: Move, value: Any) -> None:
@@ -77,11 +77,11 @@ def _add_circle(walk: Walk, move: Move, value: Any) -> None:
     if np.linalg.norm(normal) < 1e-9:
         raise UsageError(f"circle: its normal {value.normal} has no length; give the direction of the circle's axis")
     centre, angle = path_numbers.coordinates(walk.task, value.centre), 2 * np.pi * value.turns
-    walk.add_piece(move, path_pieces.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
+    walk.add_piece(move, piece_shapes.circle(walk.task, walk.spot, centre, normal, angle, value.rise, None))
 
 
 def _add_spline(walk: Walk, move: Move, value: list[list[float]]) -> None:
-    walk.add_piece(move, path_pieces.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
+    walk.add_piece(move, piece_shapes.spline(walk.task, walk.spot, [walk.target(target) for target in value]))
 
 
 def _add_offset(walk: Walk, move: Move, value: Any) -> None:
@@ -97,7 +97,7 @@ def _add_offset(walk: Walk, move: Move, value: Any) -> None:
             walk.begin_group(None)
             walk.keep_typed_turns(typed_sums)
             displacement = (fk(walk.arm, walk.q)[:3, :3] @ np.append(displacement, 0.0)[:3])[: len(displacement)]
-    walk.add_piece(move, path_pieces.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + displacement)))
+    walk.add_piece(move, piece_shapes.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + displacement)))
 
 
 def _queue_wait(walk: Walk, move: Move, value: float) -> None:

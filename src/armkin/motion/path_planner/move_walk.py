@@ -30,10 +30,10 @@ from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, join_joint_paths, joint_path
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
-from armkin.motion.tool_path import path_numbers, path_pieces
+from armkin.motion.tool_path import path_numbers, piece_shapes
 from armkin.motion.tool_path.dense_points import FIT_SHARE, PLAN_SHARES, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
-from armkin.motion.tool_path.path_pieces import Piece, Spot, split_target
+from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Piece, Spot, split_target
 from armkin.motion.tool_path.route import join_pieces
 
 if TYPE_CHECKING:
@@ -239,7 +239,7 @@ class Walk:
         tolerance = self.pace.tolerance
         pauses, fit = frozenset(self.pauses), FIT_SHARE * tolerance
         route, order = join_pieces(self.task, self.pieces, self.blends, pauses, fit, self.plan.reduced)
-        if route.length < path_pieces.MIN_LENGTH:
+        if route.length < MIN_LENGTH:
             raise UsageError("the tool's way has no length: its points are all the same")
         any_branch = self.goal is not None
         near = self.q if self.options.near is None else self.options.near
@@ -335,7 +335,7 @@ def _nearest_posture(walk: Walk, goal: Spot, branch: str | None) -> Array:
 
 def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
     """Joint values of a target on all branches within limits, or on the named one, sorted by distance."""
-    target = path_pieces.line(walk.task, goal, goal).targets(np.zeros(1))[0]
+    target = piece_shapes.line(walk.task, goal, goal).targets(np.zeros(1))[0]
     solutions = isolated_branches(walk.arm, target, walk.task.name, near=walk.q)
     numbers = find_branches(solutions.names, branches) if (branches := branch or walk.options.branch) else None
     clear = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None

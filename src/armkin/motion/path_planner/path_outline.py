@@ -12,7 +12,7 @@ from armkin.motion.branches.branch_path import Pace
 from armkin.motion.path_planner.move_kinds import MOVES
 from armkin.motion.path_planner.move_walk import PathOptions, Walk
 from armkin.motion.path_planner.path_request import TOLERANCE, default_corner_blend
-from armkin.motion.tool_path.path_pieces import line
+from armkin.motion.tool_path.piece_shapes import line
 from armkin.motion.tool_path.route import join_pieces
 
 if TYPE_CHECKING:

@@ -19,12 +19,12 @@ from armkin.motion.tool_path.path_pieces import (
     Dense,
     Piece,
     Spot,
-    line,
     rotation_vectors,
     turn_between,
     unit_speed_piece,
     weights,
 )
+from armkin.motion.tool_path.piece_shapes import line
 
 if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task

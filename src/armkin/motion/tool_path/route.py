@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array
 from armkin.inverse.tasks.task import Task
 from armkin.motion.timing.trajectory import group_numbers
+from armkin.motion.tool_path.corner_blend import blend
 from armkin.motion.tool_path.fit_points import REVERSAL_ANGLE
-from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Dense, Piece, blend
+from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Dense, Piece
 
 _ONE_BREAK = 1e-6  # distance [mm] below which two breaks are one
 _SMOOTH_ANGLE = 1e-3  # angle [rad] below which two directions are the same
