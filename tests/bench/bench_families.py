@@ -35,8 +35,8 @@ def main() -> None:
 
 def family_row(name: str, count: int, brute: int) -> str:
     arm = armkin.load(name)
-    free = redundancy(arm, None)
-    assert free is not None
+    redundant = redundancy(arm, None)
+    assert redundant is not None
     q, target = redundant_postures(arm, None, count, 11)
     armkin.ik(arm, target[:1])
     lost = missed = rows = 0
@@ -49,13 +49,15 @@ def family_row(name: str, count: int, brute: int) -> str:
         rows += int(s.within_limits.sum())
         lost += int((s.best < 0).sum())
         for k in range(len(s.valid)):
-            missed += not covers_value(arm, s.interval[k][s.within_limits[k]], q[begin + k, free.joint], 1e-8).any()
+            missed += not covers_value(
+                arm, s.interval[k][s.within_limits[k]], q[begin + k, redundant.joint], 1e-8
+            ).any()
     alone = []
     for k in range(20):
         start = time.process_time()
         armkin.ik(arm, target[k])
         alone.append(time.process_time() - start)
-    places, wrong_counts = by_brute_force(arm, free.joint, target[:brute])
+    places, wrong_counts = by_brute_force(arm, redundant.joint, target[:brute])
     return (
         f"{name:12s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
         f" {lost:5d} {missed:7d} {places:13d} {wrong_counts:9d}"

@@ -21,14 +21,14 @@ def test_the_generating_posture_lies_in_a_listed_interval(name: str, task: str |
     arm = armkin.load(name)
     q, target = redundant_postures(arm, task, 60, 3)
     s = armkin.ik(arm, target, task)
-    free = redundancy(arm, task)
-    assert free is not None
+    redundant = redundancy(arm, task)
+    assert redundant is not None
     assert s.interval is not None
     assert (s.status == Status.EXACT).all()
     assert (s.best >= 0).all()
     for k in range(len(q)):
         legal = s.interval[k][s.within_limits[k]]
-        assert covers_value(arm, legal, q[k, free.joint]).any()
+        assert covers_value(arm, legal, q[k, redundant.joint]).any()
     mm, rad = s.residual()
     assert np.nanmax(mm) <= 1e-9 * arm.reach
     assert np.nanmax(rad, initial=0.0) <= 1e-9
@@ -40,16 +40,16 @@ def test_as_many_legal_postures_as_intervals_at_any_value(name: str, task: str |
     arm = armkin.load(name)
     _, target = redundant_postures(arm, task, 1, 8)
     s = armkin.ik(arm, target, task)
-    free = redundancy(arm, task)
-    assert free is not None
+    redundant = redundancy(arm, task)
+    assert redundant is not None
     assert s.interval is not None
     for k in range(len(target)):
         legal = s.interval[k][s.within_limits[k]]
         ends = np.unique(legal.ravel().round(7))
         beside = np.concatenate([legal.ravel() - np.deg2rad(1e-6), legal.ravel() + np.deg2rad(1e-6)])
         for value in [*beside[::9], *(0.5 * (ends[1:] + ends[:-1]))[:3]]:
-            if arm.lower[free.joint] <= value <= arm.upper[free.joint]:
-                own = held_answers(arm, free.joint, float(value), target[k], task)
+            if arm.lower[redundant.joint] <= value <= arm.upper[redundant.joint]:
+                own = held_answers(arm, redundant.joint, float(value), target[k], task)
                 assert covers_value(arm, legal, value, 0.0).sum() == len(own), (k, np.rad2deg(value))
 
 
@@ -57,8 +57,8 @@ def test_as_many_legal_postures_as_intervals_at_any_value(name: str, task: str |
 def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: str | None) -> None:
     arm = armkin.load(name)
     q, target = redundant_postures(arm, task, 1, 9)
-    free = redundancy(arm, task)
-    assert free is not None
+    redundant = redundancy(arm, task)
+    assert redundant is not None
     s = armkin.ik(arm, target, task)
     assert s.interval is not None
     for k in range(len(target)):
@@ -66,7 +66,7 @@ def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: s
         values = np.linspace(low, high, 9)
         least = np.inf
         for value in values:
-            for row in held_answers(arm, free.joint, float(value), target[k], task):
+            for row in held_answers(arm, redundant.joint, float(value), target[k], task):
                 least = min(least, float(np.rad2deg(np.abs(row - arm.home)).sum()))
         assert s.motion[k, s.best[k]] <= least + 1e-6
     again = armkin.ik(arm, target, task, near=q)

@@ -82,9 +82,9 @@ def ik(
     """
     if workers != 1:
         check_workers(workers)
-    free = redundancy(arm, task)
+    redundant = redundancy(arm, task)
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
-    is_simple = rounding is None and not (single or position_first) and examine and free is None
+    is_simple = rounding is None and not (single or position_first) and examine and redundant is None
     if is_simple and (values.ndim == 1 or values.shape == (4, 4)):  # a batch prepares nothing for one
         single_solver = one_target.short_way(arm, task)
         if single_solver is not None and (solutions := single_solver.solve(values, near)) is not None:
@@ -95,8 +95,8 @@ def ik(
         return _as_commanded(arm, s)
     if position_first:
         return minima(ik, arm, task, targets, near)
-    if free is not None:
-        return families(ik, arm, free, targets, near, rounding)
+    if redundant is not None:
+        return families(ik, arm, redundant, targets, near, rounding)
     return solve_by(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
 
 

@@ -47,7 +47,7 @@ def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: 
 
 def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float) -> Points:
     """Postures moved as `onto_curves` does, so few that they stay in the cache."""
-    arm, task, unit = follower.arm, follower.free.task, radian_or_reach(follower.arm)
+    arm, task, unit = follower.arm, follower.redundant.task, radian_or_reach(follower.arm)
     target = follower.target[row]
     q, tangent = q.copy(), last.copy()
     size, active = np.full(len(q), np.inf), np.arange(len(q))
@@ -100,5 +100,5 @@ class Ways(NamedTuple):
 
     def follow(self, follower: Follower, row: Int) -> Bool:
         """Which lie on the curves of their targets row (M,), as their middles tell."""
-        miss = newton.misses(follower.arm, follower.free.task, self.at(follower, 0.5), follower.target[row])
+        miss = newton.misses(follower.arm, follower.redundant.task, self.at(follower, 0.5), follower.target[row])
         return miss < tol.MID_MISS

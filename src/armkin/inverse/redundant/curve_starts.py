@@ -77,10 +77,10 @@ def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[
 
     owner: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
     """
-    guide, values, N = nearly_closed(follower.arm, follower.free), over_a_turn(PLANES), len(follower.target)
+    guide, values, N = nearly_closed(follower.arm, follower.redundant), over_a_turn(PLANES), len(follower.target)
     row, t = np.repeat(np.arange(N), PLANES), np.tile(values, N)
-    source = follower._replace(free=guide)
-    if guide is follower.free:
+    source = follower._replace(redundant=guide)
+    if guide is follower.redundant:
         q = follower.branches_at(row, t)
         solving, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
     else:
@@ -116,7 +116,7 @@ def _answers_between(source: Follower, t: Array, defect: Array) -> tuple[Int, Ar
     best_row = defect.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
     place, branch = np.nonzero(defect[best_row] < tol.NEAR_DEFECT)
     row, q = row[best_row[place]], q[best_row[place], branch]
-    q, miss = newton.correct(source.arm, source.free.task, q, source.target[row])
+    q, miss = newton.correct(source.arm, source.redundant.task, q, source.target[row])
     rows = np.flatnonzero(miss < tol.SAME_SEED)
     rows = rows[first_of_equals(source, row[rows], q[rows])]
     return row[rows], q[rows]
@@ -136,9 +136,9 @@ def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
 
 def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Answers (M, n) of targets (M,) that no curve passes: points of curves, whose targets, the points after them."""
-    guide = nearly_closed(follower.arm, follower.free)
+    guide = nearly_closed(follower.arm, follower.redundant)
     joint = 2 if guide.joint == 0 else 4  # the shoulder is on the far side of the three joints of a spherical wrist
-    if guide is follower.free or follower.arm.prismatic[joint]:
+    if guide is follower.redundant or follower.arm.prismatic[joint]:
         return row[:0], points.q[:0]
     parts = [_off_curves_at(follower, joint, value, points, row, after) for value in VALUES]
     target, q = (np.concatenate(column) for column in zip(*parts, strict=True))
@@ -148,7 +148,7 @@ def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int)
 def _off_curves_at(follower: Follower, j: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
     """Answers (M, n) off the curves with the joint at a value, and whose they are (M,)."""
     held_arm = arm_without(follower.arm, ((follower.arm.joint_names[j], value),))
-    s = follower.ik(held_arm, follower.target, follower.free.task.name, examine=False)
+    s = follower.ik(held_arm, follower.target, follower.redundant.task.name, examine=False)
     target, branch = np.nonzero(s.valid)
     q = np.insert(s.q[target, branch], j, value, axis=1)
     crossing, owner = _crossings(follower, j, value, points, row, after)

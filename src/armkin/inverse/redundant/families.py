@@ -7,6 +7,7 @@ arm angle (`arm_angle`), or followed along the joint (`followed_branches`). Wher
 axis, which alone is asked for, each branch of the others is one.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -46,65 +47,77 @@ Curves = Turning | Followed | Traced
 
 
 def families(
-    ik: Ik, arm: Arm, free: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
+    ik: Ik, arm: Arm, redundant: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
 ) -> Solutions:
     """Legal intervals of the redundant joint, and families without one: `armkin.ik` of such an arm.
 
     q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
     """
-    if free.about_tool_axis:
-        return _with_tool_turn(ik, arm, free, targets, near, rounding)
-    task = free.task
+    if redundant.about_tool_axis:
+        return _with_tool_turn(ik, arm, redundant, targets, near, rounding)
+    task = redundant.task
     values, single = arrays.real_array(targets, "targets"), arrays.is_single(targets)
     goal, batch_shape, defect = read_targets(task, values)
     reference = read_near(arm, near, batch_shape)
     nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(goal), arm.n))
-    srs = arm_angle(arm) if free.joint else None
     numbers = (flat_targets(task, values)[0], defect)
     roundings, limit = target_rounding.of_targets(arm, task, goal, numbers, single, rounding, batch_shape)
     stands = (newton.misses(arm, task, nears, goal) <= limit) & ~outside_limits(arm, nears).any(axis=1)
-    rows = _Rows(arm, free.joint, nears, stands)
-    followed = AT_ONCE // SAMPLES if free.by_formula else TRACED
-    chunk = CIRCLES if srs else followed
-    for k in range(0, len(goal), chunk):
-        part = goal[k : k + chunk], nears[k : k + chunk]
-        if srs:
-            rows.add(Turning.along(srs, *part))
-            continue
-        follower = Follower(ik, arm, free, *part)
-        for curves in [Followed.along(follower)] if free.by_formula else trace_families(follower):
-            rows.add(curves)
-    rows.add_points(task, goal, not free.by_formula)
+    rows = _Rows(arm, redundant.joint, nears, stands)
+    follower = Follower(ik, arm, redundant, goal, nears)
+    for curves in _curves_of(follower):
+        rows.add(curves)
+    rows.add_points(task, goal, not redundant.by_formula)
     q, interval, legal, branch = rows.stack_parts()
     valid = branch >= 0
     status = np.where(valid.any(axis=1), np.where(rows.short, Status.BOUNDARY, Status.EXACT), Status.UNREACHABLE)
-    first_goal = move_targets(arm, free, goal[:1], np.zeros(len(goal[:1])))
-    names = ik(free.rest, first_goal, task.name, examine=False).names if len(goal) else ()
-    names += tuple(f"branch {i + 1}" for i in range(len(names), 1 + int(branch.max(initial=-1))))
-    method, why, _ = method_of_families(arm, free)
+    names = _branch_names(follower, 1 + int(branch.max(initial=-1)))
+    method, why, _ = method_of_families(arm, redundant)
     batch = Batch(q, valid, legal, branch, status.astype(np.int8), np.zeros(nears.shape, bool), rows.complete)
     s = as_solutions(Goals(arm, task, goal, nears), reference, batch_shape, batch, roundings, (names, method, why))
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
+def _curves_of(follower: Follower) -> Iterator[Curves]:
+    """The curves of all targets, some at a time: by the arm angle, followed along the redundant joint, or traced."""
+    srs = arm_angle(follower.arm) if follower.redundant.joint else None
+    followed = AT_ONCE // SAMPLES if follower.redundant.by_formula else TRACED
+    for rows in arrays.slices(len(follower.target), CIRCLES if srs else followed):
+        part = follower.of(rows)
+        if srs:
+            yield Turning.along(srs, part.target, part.near)
+        elif part.redundant.by_formula:
+            yield Followed.along(part)
+        else:
+            yield from trace_families(part)
+
+
+def _branch_names(follower: Follower, count: int) -> tuple[str, ...]:
+    """Names of branches, as many as count: those of the other joints', then numbers."""
+    ik, _, redundant, target, _ = follower
+    goal = move_targets(follower.arm, redundant, target[:1], np.zeros(len(target[:1])))
+    names = ik(redundant.rest, goal, redundant.task.name, examine=False).names if len(target) else ()
+    return names + tuple(f"branch {i + 1}" for i in range(len(names), count))
+
+
 def _with_tool_turn(
-    ik: Ik, arm: Arm, free: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
+    ik: Ik, arm: Arm, redundant: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
 ) -> Solutions:
     """The branches of the others, which the redundant joint's motion leaves as they are: each is a family."""
-    r = free.joint
-    batch_shape = flat_targets(free.task, arrays.real_array(targets, "targets"))[1]
+    r = redundant.joint
+    batch_shape = flat_targets(redundant.task, arrays.real_array(targets, "targets"))[1]
     reference = read_near(arm, near, batch_shape)
-    s = ik(free.rest, targets, free.task.name, near=np.delete(reference, r, axis=-1), rounding=rounding)
+    s = ik(redundant.rest, targets, redundant.task.name, near=np.delete(reference, r, axis=-1), rounding=rounding)
     reference = np.broadcast_to(reference, (*batch_shape, arm.n)).copy()
     value = np.clip(reference[..., r], arm.lower[r], arm.upper[r])[..., None]
     turns = arm.upper[r] - arm.lower[r] >= 2 * np.pi
     interval = np.full((*s.valid.shape, 2), np.nan)
     interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
-    method, why, _ = method_of_families(arm, free)
+    method, why, _ = method_of_families(arm, redundant)
     return replace(
         s,
         arm=arm,
-        task=free.task,
+        task=redundant.task,
         near=reference,
         q=np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1),
         status=np.where(s.status == Status.BOUNDARY, np.int8(Status.EXACT), s.status),  # a family moves the joint
@@ -115,22 +128,22 @@ def _with_tool_turn(
     )
 
 
-def method_of_families(arm: Arm, free: Redundancy) -> tuple[str, str, bool]:
+def method_of_families(arm: Arm, redundant: Redundancy) -> tuple[str, str, bool]:
     """The method of an arm with a redundant joint, why, and whether it guarantees all families."""
-    joint = arm.joint_names[free.joint]
-    if free.about_tool_axis:
+    joint, name = arm.joint_names[redundant.joint], redundant.geometry.name
+    if redundant.about_tool_axis:
         why = f"{joint} turns about the tool's axis: ik lists the interval of its values; the others: "
-        return f"families of {joint}", why + free.geometry.why, free.geometry.complete
+        return f"families of {joint}", why + redundant.geometry.why, redundant.geometry.complete
     actual, complete = actual_arm(arm), False
-    if free.joint and arm_angle(actual) is not None:
+    if redundant.joint and arm_angle(actual) is not None:
         manner, complete = "in closed form by the arm angle", True
-    elif free.joint and free.by_formula and boundaries(actual) is not None:
-        manner, complete = f"{free.geometry.name}, between all values of it where a limit or a merging may be", True
-    elif free.by_formula:
-        manner = f"{free.geometry.name}, at {SAMPLES} values of it"
+    elif redundant.joint and redundant.by_formula and boundaries(actual) is not None:
+        manner, complete = f"{name}, between all values of it where a limit or a merging may be", True
+    elif redundant.by_formula:
+        manner = f"{name}, at {SAMPLES} values of it"
     else:
-        guide = nearly_closed(actual, free)
-        name = free.geometry.name if guide is free else f"near {guide.geometry.name}"
+        guide = nearly_closed(actual, redundant)
+        name = name if guide is redundant else f"near {guide.geometry.name}"
         manner = f"{name}, at {PLANES} values of {arm.joint_names[guide.joint]}, and traced between them"
     why = f"{joint} is redundant: ik lists the intervals of its values; the others: {manner}"
     return f"families of {joint}", why, complete

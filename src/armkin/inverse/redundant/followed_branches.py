@@ -37,7 +37,7 @@ class Followed(NamedTuple):
         """Curves of the targets in two ways: those of which all places of a change are known, and others."""
         N = len(follower.target)
         parts, is_short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)
-        bounds = boundaries(follower.arm) if follower.free.joint == follower.arm.n - 1 else None
+        bounds = boundaries(follower.arm) if follower.redundant.joint == follower.arm.n - 1 else None
         if bounds is not None:
             angles, decided = boundary_angles(bounds, follower.target)
             if len(rows := np.flatnonzero(decided)):
@@ -51,7 +51,7 @@ class Followed(NamedTuple):
     def values_to_try(self, pieces: Pieces, near: Array) -> list[Array]:
         """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
         near has the joint, and beside that sample."""
-        value = near[:, self.follower.free.joint]
+        value = near[:, self.follower.redundant.joint]
         value = value + np.round((pieces.at - value) / (2 * np.pi)) * 2 * np.pi
         return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
 
@@ -83,7 +83,7 @@ def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     summary = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
     pieces, is_short = _all_pieces(follower, summary), summary.short
     if finer == 1:
-        within_reach = distance(follower.arm, follower.free.task, follower.target) <= 1.0 + tol.SOLUTION
+        within_reach = distance(follower.arm, follower.redundant.task, follower.target) <= 1.0 + tol.SOLUTION
         unanswered = summary.lost & (follower.arm.prismatic.any() | within_reach)
         for factor, repeated in ((CLOSER_FACTOR, summary.hidden & ~unanswered), (FINER_FACTOR, unanswered)):
             targets = np.flatnonzero(repeated)

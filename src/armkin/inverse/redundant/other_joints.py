@@ -62,13 +62,13 @@ class Sampled(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def _recorded_form(arm: Arm, free: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
+def _recorded_form(arm: Arm, redundant: Redundancy) -> tuple[StraightLineCode, tuple[int, ...]]:
     """The closed form of the others with the redundant joint as an argument: of a target's entries and its pair."""
-    rest_form = recorded_formula(free.rest, solver(free.rest, free.task.name)[0], free.geometry)
-    inputs = 12 if free.task.orientation == "full" else len(free.task.labels)
+    rest_form = recorded_formula(redundant.rest, solver(redundant.rest, redundant.task.name)[0], redundant.geometry)
+    inputs = 12 if redundant.task.orientation == "full" else len(redundant.task.labels)
 
     def formula(x: list[Entry]) -> list[Entry]:
-        goal = move_entries(arm, free, x[:inputs], Pair(x[inputs], x[inputs + 1]))
+        goal = move_entries(arm, redundant, x[:inputs], Pair(x[inputs], x[inputs + 1]))
         return rest_form.candidates(goal, [None] * rest_form.arm.n)
 
     return StraightLineCode(formula, inputs + 2), rest_form.axes
@@ -84,28 +84,28 @@ class Follower(NamedTuple):
 
     ik: Ik
     arm: Arm
-    free: Redundancy
+    redundant: Redundancy
     target: Array
     near: Array
 
-    def of(self, rows: Int) -> Follower:
+    def of(self, rows: Int | slice) -> Follower:
         """For some of the targets."""
         return self._replace(target=self.target[rows], near=self.near[rows])
 
     def branches_at(self, rows: Int, t: Array) -> Array:
         """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
         where there is none."""
-        if not self.free.by_formula:
-            goal = move_targets(self.arm, self.free, self.target[rows], t)
-            s = self.ik(self.free.rest, goal, self.free.task.name, examine=False)
-            return np.insert(s.q, self.free.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
+        if not self.redundant.by_formula:
+            goal = move_targets(self.arm, self.redundant, self.target[rows], t)
+            s = self.ik(self.redundant.rest, goal, self.redundant.task.name, examine=False)
+            return np.insert(s.q, self.redundant.joint, np.where(s.valid, t[:, None], np.nan), axis=2)
         q, misses = self.candidates(rows, t)
         np.copyto(q, np.nan, where=~(misses <= tol.ACCEPTED)[..., None])
         return q
 
     def candidates(self, rows: Int, t: Array) -> tuple[Array, Array]:
         """All branches (M, B, n) of a closed form, real or not, and what they miss (M, B)."""
-        axes = _recorded_form(self.arm, self.free)[1]
+        axes = _recorded_form(self.arm, self.redundant)[1]
         columns = np.empty((self.arm.n, math.prod(axes), len(t)))  # one joint after another in memory
         misses = np.empty(columns.shape[1:])
         room: list[NDArray[Any]] = []
@@ -120,19 +120,19 @@ class Follower(NamedTuple):
     def _candidates(self, rows: Int, t: Array, room: list[NDArray[Any]]) -> list[Any]:
         """The values of all joints and what they miss, squared, on their own branch axes before targets (M,); the
         workspace that they stand in, room if that is one for as many."""
-        code, _ = _recorded_form(self.arm, self.free)
+        code, _ = _recorded_form(self.arm, self.redundant)
         if not room or room[0].shape[-1] != len(t):
             room = code.workspace(len(t))
-        goal = [np.asarray(x)[rows] for x in target_entries(self.free.task, self.target)]
+        goal = [np.asarray(x)[rows] for x in target_entries(self.redundant.task, self.target)]
         *values, miss, _, _ = code.run([*goal, np.cos(t), np.sin(t)], room)
-        values.insert(self.free.joint, t)
+        values.insert(self.redundant.joint, t)
         return [*values, miss, room]
 
     def samples_at(self, pick: Int, t: Array, extra: Array | None = None) -> Sampled:
         """Some of the targets (S,), of a closed form, at all of t (K,) and at extra values (S, M), inf where there are
         fewer; by default between those at which more may happen."""
         rows, values = np.repeat(pick, len(t)), np.tile(t, len(pick))
-        axes = _recorded_form(self.arm, self.free)[1]
+        axes = _recorded_form(self.arm, self.redundant)[1]
         *columns, misses, _ = self._candidates(rows, values, [])
         if extra is None:
             extra = _values_between(self.arm, columns, misses, axes, t)
@@ -171,7 +171,7 @@ class Follower(NamedTuple):
     def own(self, rows: Int, branch: Int, t: Array) -> Array:
         """One branch each (M, n), as `branches_at`."""
         *columns, miss, _ = self._candidates(rows, t, [])
-        place = np.unravel_index(branch, _recorded_form(self.arm, self.free)[1])
+        place = np.unravel_index(branch, _recorded_form(self.arm, self.redundant)[1])
 
         def picked(values: Array) -> Array:
             axes = values.shape[:-1]

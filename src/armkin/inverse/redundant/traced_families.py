@@ -88,7 +88,7 @@ class Traced(NamedTuple):
         """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
         follower, q = self.follower, q.copy()
         for _ in range(LAST):
-            residual, J = newton.scaled(follower.arm, follower.free.task, q, follower.target[pieces.row])
+            residual, J = newton.scaled(follower.arm, follower.redundant.task, q, follower.target[pieces.row])
             weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), residual[:, :, None])
             q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
         return q
@@ -101,7 +101,7 @@ class Traced(NamedTuple):
 
     def _nodes(self) -> _Nodes:
         """Samples of all curves, and where something changes between them."""
-        arm, j, P = self.follower.arm, self.follower.free.joint, len(self.row)
+        arm, j, P = self.follower.arm, self.follower.redundant.joint, len(self.row)
         point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
         part, samples = np.tile(parts, P), [self.ways.at(self.follower, u) for u in parts]
         q = np.stack(samples, axis=1).reshape(-1, arm.n)
@@ -148,7 +148,7 @@ class Traced(NamedTuple):
 
     def _turning(self, point: Int, low: Array) -> tuple[Array, Array]:
         """Shares of the way (M,) at which the joint turns back, and the postures there: by a step along the tangent."""
-        j, arcs = self.follower.free.joint, rows_of(self.ways, point)
+        j, arcs = self.follower.redundant.joint, rows_of(self.ways, point)
         share = _find_root(lambda t: arcs.slope(t, j), low, low + 1.0 / PARTS)
         end = self._between(point, share)
         size = np.maximum(np.sqrt((arcs.begin**2).sum(axis=1)), tol.TINY)
@@ -197,7 +197,7 @@ class _Nodes(NamedTuple):
         cost = motion(curves.follower.arm, q, near)
         costs = np.concatenate([cost[node], np.where(fits, cost, np.inf)[node]])
         best_sample = best_samples(costs, curve + len(row) * legal, first, length + 1)
-        a, b = _ends_of_pieces(self.q[node, curves.follower.free.joint], curve, first, length)
+        a, b = _ends_of_pieces(self.q[node, curves.follower.redundant.joint], curve, first, length)
 
         def parameter(sample: Int) -> Array:
             return np.asarray(value[curve, sample % K] + curves.counts[curve] * (sample // K))

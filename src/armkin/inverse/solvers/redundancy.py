@@ -70,16 +70,17 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
 
 
 @lru_cache(maxsize=64)
-def nearly_closed(arm: Arm, free: Redundancy) -> Redundancy:
+def nearly_closed(arm: Arm, redundant: Redundancy) -> Redundancy:
     """A joint whose others miss a closed form by little, to be held in place of the redundant one; else that one."""
     for joint in (arm.n - 1, 0):
-        if free.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
+        if redundant.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
         rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
-        for ideal in (module.recognise(rest_arm, free.task, tol.NEAR_DEFECT) for module in (spherical, three_parallel)):
-            if ideal is not None and (option := Redundancy(joint, rest_arm, free.task, ideal)).by_formula:
+        for module in (spherical, three_parallel):
+            ideal = module.recognise(rest_arm, redundant.task, tol.NEAR_DEFECT)
+            if ideal is not None and (option := Redundancy(joint, rest_arm, redundant.task, ideal)).by_formula:
                 return option
-    return free
+    return redundant
 
 
 def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
@@ -88,61 +89,61 @@ def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
     return task.orientation == "axis" and task.position == 3 and bool(np.abs(offsets).max() <= tol.EXACT)
 
 
-def move_targets(arm: Arm, free: Redundancy, target: Array, t: Array) -> Array:
+def move_targets(arm: Arm, redundant: Redundancy, target: Array, t: Array) -> Array:
     """Targets (M, m) or (M, 4, 4) as those of the rest, for values t (M,) of the redundant joint."""
-    if free.about_tool_axis:
+    if redundant.about_tool_axis:
         return target.copy()
     Z = joint_motion(False, -t)
-    if free.joint:
+    if redundant.joint:
         return np.asarray(target @ (inverse(arm.link[-1]) @ Z @ arm.link[-1]))
     G = arm.link[0] @ Z @ inverse(arm.link[0])
-    if free.task.orientation == "full":
+    if redundant.task.orientation == "full":
         return np.asarray(G @ target)
-    targets, p = target.copy(), free.task.position
+    targets, p = target.copy(), redundant.task.position
     targets[:, :p] = np.einsum("mij,mj->mi", G[:, :p, :p], target[:, :p]) + G[:, :p, 3]
-    targets[:, p : p + len(free.task.sums)] -= t[:, None] * free.task.sums[:, 0]
-    if free.task.orientation == "axis":
+    targets[:, p : p + len(redundant.task.sums)] -= t[:, None] * redundant.task.sums[:, 0]
+    if redundant.task.orientation == "axis":
         targets[:, 3:] = np.einsum("mij,mj->mi", G[:, :3, :3], target[:, 3:])
     return targets
 
 
-def held_by_near(arm: Arm, free: Redundancy) -> Geometry:
+def held_by_near(arm: Arm, redundant: Redundancy) -> Geometry:
     """The class of the rest as one of the whole arm: the redundant joint is where the preferred motion has it."""
-    r, solve_others = free.joint, free.geometry.pairs
-    reason = f"{free.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
+    r, solve_others = redundant.joint, redundant.geometry.pairs
+    reason = f"{redundant.geometry.why}; {arm.joint_names[r]} is redundant and held where near has it"
     if solve_others is None:
-        return replace(free.geometry, why=reason)
+        return replace(redundant.geometry, why=reason)
 
     def pairs(goal: list[Entry], prefer: Prefer) -> Candidates:
         pair = prefer[r]
         assert pair is not None
-        candidates = solve_others(move_entries(arm, free, goal, pair), [*prefer[:r], *prefer[r + 1 :]])
+        candidates = solve_others(move_entries(arm, redundant, goal, pair), [*prefer[:r], *prefer[r + 1 :]])
         angles = [*(candidates.angles or [None] * len(candidates.pairs))]
         angles.insert(r, None)
         return candidates._replace(pairs=[*candidates.pairs[:r], pair, *candidates.pairs[r:]], angles=angles)
 
-    return replace(free.geometry, pairs=pairs, why=reason, doubts=None)
+    return replace(redundant.geometry, pairs=pairs, why=reason, doubts=None)
 
 
-def move_entries(arm: Arm, free: Redundancy, goal: list[Entry], pair: Pair) -> list[Entry]:
+def move_entries(arm: Arm, redundant: Redundancy, goal: list[Entry], pair: Pair) -> list[Entry]:
     """`move_targets` of one target's entries, for the cosine and sine of the redundant joint."""
     c, s = pair
-    if free.about_tool_axis:
+    if redundant.about_tool_axis:
         return goal
-    if free.joint:
+    if redundant.joint:
         L = arm.link[-1]
         undo = pose.rotate(pose.constant(inverse(L)), c, arrays.sub(0.0, s))
         return pose.compose(pose.compose(goal, undo), pose.constant(L))
     L = arm.link[0]
     G = pose.compose(pose.rotate(pose.constant(L), c, arrays.sub(0.0, s)), pose.constant(inverse(L)))
-    if free.task.orientation == "full":
+    if redundant.task.orientation == "full":
         return pose.compose(G, goal)
-    p = free.task.position
+    p = redundant.task.position
     entries = pose.apply(G, [*goal[:p], 0.0][:3])[:p]
     angle = arrays.arctan2(s, c)
-    for k, rate in enumerate(free.task.sums[:, 0].tolist(), p):
+    for k, rate in enumerate(redundant.task.sums[:, 0].tolist(), p):
         entries.append(arrays.sub(goal[k], arrays.mul(rate, angle)))
-    return [*entries, *(pose.turn_direction(G, goal[3:6]) if free.task.orientation == "axis" else [])]
+    return [*entries, *(pose.turn_direction(G, goal[3:6]) if redundant.task.orientation == "axis" else [])]
 
 
 @lru_cache(maxsize=128)
@@ -155,20 +156,20 @@ def redundant_alone(arm: Arm, task_name: str | None, held: Mapping[str, float]) 
     """The redundant joint, if that alone is held: for all its values one arm is prepared once, with other targets."""
     if len(held) != 1 or arm.keep_out or (arm.ratio != 1.0).any():
         return None
-    free = redundancy(arm, task_name)
-    return free if free is not None and arm.joint_names[free.joint] in held else None
+    redundant = redundancy(arm, task_name)
+    return redundant if redundant is not None and arm.joint_names[redundant.joint] in held else None
 
 
 def without_held(arm: Arm, task_name: str | None, held: Mapping[str, float], targets: Array) -> tuple[Arm, Array]:
     """The arm of the joints that are not held [rad | mm], and targets (N, ...) as its own."""
-    free = redundant_alone(arm, task_name, held)
-    if free is None:
+    redundant = redundant_alone(arm, task_name, held)
+    if redundant is None:
         return arm_without(arm, tuple(held.items())), targets
     [value] = held.values()
-    return free.rest, move_targets(arm, free, targets, np.full(len(targets), value))
+    return redundant.rest, move_targets(arm, redundant, targets, np.full(len(targets), value))
 
 
 def redundant_joint(arm: Arm, task_name: str | None) -> str:
     """The name of the redundant joint; of an arm that has one."""
-    free = redundancy(arm, task_name)
-    return "" if free is None else arm.joint_names[free.joint]
+    redundant = redundancy(arm, task_name)
+    return "" if redundant is None else arm.joint_names[redundant.joint]
