@@ -22,9 +22,9 @@
         ├── GripperLostError    nobody knows where the gripper stands
         └── GripperKnownError   its position is known, so that nobody may vouch for another
 
-A message says what is wrong, where and what is allowed, in one or two lines, in words that hold for a
-program, too; `fields` says the same in values. Only the command line maps these classes to exit codes and
-names its options as the next step (`armkin.cli.advice`).
+A message says what is wrong, where and what is allowed, in one or two lines. It may name a command of armkin, as
+`armkin ports`, and no option: only the command line names these (`armkin.cli.advice`) and has exit codes. `fields`
+holds values for a program; a class below names those that it always has, and other errors have few or none.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class ArmkinError(Exception):
     Args:
         message: what is wrong, where and what is allowed.
         advice: the next step in Python; the command line has its own words for it.
-        **fields: what the message is about, as values of JSON in mm and degrees: joint, value, lower, upper, file, ...
+        **fields: values of JSON in mm and degrees, as joint, value, lower, upper, file; see the classes.
 
     >>> error = NoSolutionError("q2 = 130 deg is outside -20 to 120 deg", joint="q2", value=130.0)
     >>> error.kind, error.fields
@@ -99,7 +99,7 @@ class RedundantArmError(UsageError):
 
 
 class NoHomingError(UsageError):
-    """Joints have no limit switch to home by; fields: joints, file."""
+    """Joints have no limit switch to home by; fields: joints, file, some (whether others have one)."""
 
 
 class PathFileError(UsageError):
@@ -137,7 +137,7 @@ class NoSolutionError(ArmkinError):
 class NoBranchError(NoSolutionError):
     """Branches reach the target, and none within the limits, or none of the name asked for.
 
-    fields: robot, status, distance_mm, branches_within_limits.
+    fields: robot, status, branches_within_limits, and distance_mm or, if keep-outs block all branches, hits.
     """
 
 
@@ -154,7 +154,7 @@ class LinkError(ArmkinError):
 
 
 class HeldError(LinkError):
-    """The board has held a motion on its way, and knows where the arm stands; fields: joints."""
+    """The board has held a motion on its way, and knows where the arm stands; fields: joints (values)."""
 
 
 class PortInUseError(LinkError):
@@ -170,7 +170,7 @@ class HomingIncompleteError(LinkError):
 
 
 class PositionKnownError(LinkError):
-    """The arm's position is known, so that nobody may vouch for another; fields: joints."""
+    """The arm's position is known, so that nobody may vouch for another; fields: joints (values)."""
 
 
 class GripperLostError(LinkError):
