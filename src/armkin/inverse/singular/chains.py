@@ -4,11 +4,11 @@ A component on which the residual grows has two ends, where that passes `SOLUTIO
 it, and nothing else is.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.local_structure import Structure, leave_spans, members, structure_ahead
@@ -31,54 +31,85 @@ class Followed(NamedTuple):
     uncrossed: Bool  # whether both are, and no other curve crosses in between
 
 
+class _Chains:
+    """Two chains of curves from each of m postures: the first half of C = 2 m goes along v, the second against it."""
+
+    def __init__(self, arm: Arm, task: Task, at: Structure, begun: Int, q: Array, peers: Array, target: Array) -> None:
+        """begun: (m,) the postures; others as in `follow`."""
+        self._arm, self._task, posture = arm, task, np.tile(begun, 2)
+        self._q, self._peers, self._target = q[posture], peers[posture], target[posture]
+        self._span = (at.span_ratio * at.span)[posture]  # (C,) that of the next curve
+        heading = np.concatenate([at.v[begun], -at.v[begun]])
+        # (C, n) where the last curve leaves its span, nan if its component ends before, and the way there
+        self._end, self._heading = leave_spans(arm, at, posture, self._q, heading)
+        self.finished = np.isnan(self._end[:, 0])  # (C,) whether the component has ended, or closed
+        self.active = ~self.finished  # (C,) whether another curve follows
+        self.members = np.zeros(self._peers.shape[:2], bool)  # (C, K) which peers are on the way
+        self._least_way, self._most_way = at.least_way[posture], at.most_way[posture]
+        self.boundary, self.uncrossed = at.boundary[posture], at.uncrossed[posture]
+
+    def add_curves(self) -> None:
+        """One more curve for each chain that is active."""
+        arm, chains = self._arm, np.flatnonzero(self.active)
+        start, every, target = self._end[chains], np.arange(len(chains)), self._target[chains]
+        curve = structure_ahead(arm, self._task, start, target, self._span[chains], self._heading[chains])
+        self._span[chains] *= curve.span_ratio
+        self.active[chains] = curve.second > tol.HIGH_ORDER
+        holds = curve.followed & self.active[chains]
+        # a curve closes where its two sides meet: a step may pass where the other was, or now is
+        opposite = (chains + len(self.active) // 2) % len(self.active)
+        opposite_start, holding = self._end[opposite], chains[holds]
+        end, heading = leave_spans(arm, curve, every, start, curve.v)
+        self._end[holding], self._heading[holding] = end[holds], heading[holds]
+        tested = np.concatenate([self._peers[chains], opposite_start[:, None], self._end[opposite][:, None]], axis=1)
+        passed = members(curve, every, newton.difference(arm, tested, start[:, None])) & holds[:, None]
+        self.members[chains] |= passed[:, :-2]
+        shift = newton.difference(arm, start, self._q[chains])
+        self._least_way[holding] = np.minimum(self._least_way[holding], (shift + curve.least_way)[holds])
+        self._most_way[holding] = np.maximum(self._most_way[holding], (shift + curve.most_way)[holds])
+        self.boundary[holding] |= curve.boundary[holds]
+        self.uncrossed[holding] &= curve.uncrossed[holds]
+        self.finished[holding] = np.isnan(end[holds, 0])
+        closed = passed[:, -2:].any(axis=1)
+        self.finished[chains[closed]] = self.finished[opposite[closed]] = True
+        self.active &= ~self.finished
+
+    def extent(self) -> Array:
+        """How far the joints of each posture move in all (m, n)."""
+        return np.asarray(by_sides(self._most_way).max(axis=0) - by_sides(self._least_way).min(axis=0))
+
+
+def by_sides(array: Array | Bool) -> Any:
+    """What chains (C, ...) have by their sides: (2, m, ...)."""
+    return array.reshape(2, -1, *array.shape[1:])
+
+
 def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> Followed:
     """The components of postures q (M, n), whose structures are `at`, and which of their peers (M, K, n) lie on them.
 
     Components on which the residual grows, and those that leave a shortened span, are followed both ways until they
     end or close; the latter at most as far as tells that they are manifolds.
     """
-    in_chains = members(at, np.arange(len(q)), newton.difference(arm, peers, q[:, None]))
+    on_component = members(at, np.arange(len(q)), newton.difference(arm, peers, q[:, None]))
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
     joints, uncrossed = at.joints.copy(), at.uncrossed.copy()
     residual = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
     goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.ROUNDING_RESIDUAL), at.followed)
     begun = np.flatnonzero(goes_on & (at.second > tol.HIGH_ORDER))
-    if not len(begun):
-        return Followed(in_chains, known, manifold, boundary, joints, ended, ended & uncrossed)
-    least_way, most_way = at.least_way.copy(), at.most_way.copy()
-    # two chains each: the first half of these arrays begins along v, the second against it
-    posture, span = np.tile(begun, 2), np.tile((at.span_ratio * at.span)[begun], 2)
-    end, heading = leave_spans(arm, at, posture, q[posture], np.concatenate([at.v[begun], -at.v[begun]]))
-    finished = np.isnan(end[:, 0])
-    chains = np.flatnonzero(~finished)
-    for count in range(1, LINKS + 1):
-        if not len(chains):
-            break
-        row, start, every = posture[chains], end[chains], np.arange(len(chains))
-        link = structure_ahead(arm, task, start, target[row], span[chains], heading[chains])
-        holds = link.followed & (link.second > tol.HIGH_ORDER)
-        span[chains] *= link.span_ratio
-        link_end, link_heading = leave_spans(arm, link, every, start, link.v)
-        # a curve closes where its two sides meet: a step may pass where the other was, or now is
-        opposite = (chains + len(begun)) % len(posture)
-        opposite_start = end[opposite]
-        end[chains[holds]], heading[chains[holds]] = link_end[holds], link_heading[holds]
-        tested = np.concatenate([peers[row], opposite_start[:, None], end[opposite][:, None]], axis=1)
-        passed = members(link, every, newton.difference(arm, tested, start[:, None])) & holds[:, None]
-        np.logical_or.at(in_chains, row, passed[:, :-2])
-        shift = newton.difference(arm, start, q[row])
-        np.minimum.at(least_way, row[holds], (shift + link.least_way)[holds])
-        np.maximum.at(most_way, row[holds], (shift + link.most_way)[holds])
-        np.logical_and.at(uncrossed, row[holds], link.uncrossed[holds])
-        np.logical_or.at(boundary, row[holds], link.boundary[holds])
-        finished[chains] = holds & np.isnan(link_end[:, 0])
-        closes = passed[:, -2:].any(axis=1)
-        finished[chains[closes]] = finished[opposite[closes]] = True
-        enough = ~at.known & ((count == FEW_LINKS) | ((most_way - least_way).max(axis=1) >= tol.REACH))
-        chains = chains[~(finished[chains] | enough[row]) & (link.second > tol.HIGH_ORDER)]
-    extent, ended[begun] = (most_way - least_way)[begun], finished.reshape(2, -1).all(axis=0)
-    manifold[begun] = extent.max(axis=1) >= tol.REACH
-    known[begun], boundary[begun] = manifold[begun] | ended[begun], boundary[begun] & ~manifold[begun]
-    joints[begun] = manifold[begun, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
-    return Followed(in_chains, known, manifold, boundary, joints, ended, ended & uncrossed)
+    if len(begun):
+        chains = _Chains(arm, task, at, begun, q, peers, target)
+        for count in range(1, LINKS + 1):
+            if not chains.active.any():
+                break
+            chains.add_curves()
+            enough = (count == FEW_LINKS) | (chains.extent().max(axis=1) >= tol.REACH)
+            chains.active &= ~np.tile(enough & ~at.known[begun], 2)
+        extent, ended[begun] = chains.extent(), by_sides(chains.finished).all(axis=0)
+        on_component[begun] |= by_sides(chains.members).any(axis=0)
+        manifold[begun] = extent.max(axis=1) >= tol.REACH
+        known[begun] = manifold[begun] | ended[begun]
+        boundary[begun] = by_sides(chains.boundary).any(axis=0) & ~manifold[begun]
+        uncrossed[begun] = by_sides(chains.uncrossed).all(axis=0)
+        joints[begun] = manifold[begun, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
+    return Followed(on_component, known, manifold, boundary, joints, ended, ended & uncrossed)

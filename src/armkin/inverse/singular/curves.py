@@ -103,7 +103,11 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
     gain[:, 0] = 0.0
     pull_back = (V * gain[:, None]) @ np.swapaxes(V, 1, 2) @ np.swapaxes(J, 1, 2)
     for _ in range(3):
-        q = q + (pull_back @ r[:, :, None])[:, :, 0] * radian_or_reach(arm)
+        step = (pull_back @ r[:, :, None])[:, :, 0]
+        step[np.abs(step).max(axis=1) < tol.ARRIVED_STEP] = 0.0
+        if not step.any():
+            break
+        q = q + step * radian_or_reach(arm)
         r = newton.residuals(arm, task, q, target)
     return q, V, np.sqrt(np.maximum(L[:, 1], 0.0)), np.sqrt((r * r).sum(axis=1))
 

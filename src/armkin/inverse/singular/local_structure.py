@@ -7,7 +7,7 @@ way along v, and a curve x(t). The component of the solution set is the interval
 (docs/solution.md).
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -229,7 +229,7 @@ def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[B
     g = _least_residual(inverse[:, :, n:, :rows], along_u)
     values = np.concatenate([x, g], axis=2)
     # the polynomials are exact on the span if the last coefficients of their Chebyshev series are small
-    last = np.abs(np.tensordot(TO_LAST, values, axes=1)).max(axis=0)
+    last = np.abs(_combine_nodes(TO_LAST, values)).max(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         error = np.maximum(
             last[:, :n].max(axis=1) / (tol.SMOOTH_ERROR * span), last[:, n:].max(axis=1) / (0.01 * tol.SOLUTION)
@@ -237,7 +237,7 @@ def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[B
         # the last coefficients grow with the span to that power
         span_ratio = side.gain * np.minimum(0.9 * error ** (1.0 / (2 - NODES)), MAX_RATIO) - USED_SHARE
         holds &= error < 1.0
-    power = np.tensordot(side.to_powers, values, axes=1)
+    power = _combine_nodes(side.to_powers, values)
     uncrossed = _crossed_by_none(inverse, np.multiply.outer(-np.diff(side.node), span))
     return np.asarray(holds), span_ratio, uncrossed, power[:, :, :n], power[:, :, n:]
 
@@ -254,8 +254,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
     rows, k = u.shape[1:]
     t, unit = np.multiply.outer(side.node, span)[:, :, None], radian_or_reach(arm)
     x = t * (v + 0.5 * t * w)
-    inverse, along_u = np.empty((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
-    bordered = np.zeros(inverse.shape)
+    bordered, along_u = np.zeros((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
     bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
     # steps that do not halve from one to the next lead to no curve, or to another one
     holds, active = np.zeros(M, bool), np.arange(M)
@@ -264,12 +263,12 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
         part = active if len(active) < M else slice(None)  # numbers cost copies
         way, goal = x[:, part], np.concatenate([target[part]] * NODES)
         r, J = newton.scaled(arm, task, (q[part] + way * unit).reshape(-1, n), goal)
-        matrix = bordered[:, part]
-        matrix[:, :, :rows, :n] = J.reshape(NODES, -1, rows, n)
+        bordered[:, part, :rows, :n] = J.reshape(NODES, -1, rows, n)
         t_error = t[:, part] - (v[part] * way).sum(axis=2, keepdims=True)
-        inverted = newton.nudged(np.linalg.inv, matrix.reshape(-1, rows + 1, rows + 1)).reshape(matrix.shape)
-        step = (inverted @ np.concatenate([r.reshape(NODES, -1, rows), t_error], axis=2)[..., None])[..., 0]
-        x[:, part], along_u[:, part], inverse[:, part] = way + step[:, :, :n], step[:, :, n:], inverted
+        missing = np.concatenate([r.reshape(NODES, -1, rows), t_error], axis=2)
+        matrix = bordered[:, part].reshape(-1, rows + 1, rows + 1)
+        step = newton.nudged(np.linalg.solve, matrix, missing.reshape(-1, rows + 1, 1)).reshape(missing.shape)
+        x[:, part], along_u[:, part] = way + step[:, :, :n], step[:, :, n:]
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # Newton's method squares the error: the next step is about size^3 / last_size^2 long
         arrived = (size < tol.ARRIVED_STEP) | (size**3 < tol.ERROR * last_size[part] ** 2)
@@ -278,6 +277,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
         active = active[~arrived & at_hand]
         if not len(active):
             break
+    inverse = newton.nudged(np.linalg.inv, bordered.reshape(-1, rows + 1, rows + 1)).reshape(bordered.shape)
     return holds, x, along_u, inverse
 
 
@@ -311,12 +311,21 @@ TO_LAST = _FIT[-2:]
 
 
 def _evaluate(coefficients: Array, s: Array) -> Array:
-    """Polynomials (NODES, M, k) at s (..., M): (..., M, k), Horner's way."""
-    values, s = np.zeros((*s.shape, coefficients.shape[2])), s[..., None]
-    for c in coefficients[::-1]:
-        values *= s
-        values += c
-    return values
+    """Polynomials (NODES, M, k) at s (..., M): (..., M, k)."""
+    powers = np.empty((*s.shape, len(coefficients)))
+    powers[..., 0], powers[..., 1:] = 1.0, s[..., None]
+    powers = np.multiply.accumulate(powers, axis=-1)
+    return np.asarray((powers[..., None, :] @ coefficients.swapaxes(0, 1))[..., 0, :])
+
+
+def _combine_nodes(weights: Any, values: Array) -> Array:
+    """Sums of values (NODES, M, k) by weights (S, NODES): (S, M, k)."""
+    return np.asarray((weights @ values.reshape(len(values), -1)).reshape(len(weights), *values.shape[1:]))
+
+
+def _exceeds(residual: Array) -> Bool:
+    """Where residuals (..., k) are larger than `SOLUTION`: (...)."""
+    return np.asarray((residual * residual).sum(axis=-1) > tol.SOLUTION**2)
 
 
 def _ends_of_components(g: Array, side: Side) -> tuple[Array, Bool]:
@@ -327,14 +336,14 @@ def _ends_of_components(g: Array, side: Side) -> tuple[Array, Bool]:
     distance, ended = np.ones(g.shape[1]), np.zeros(g.shape[1], bool)
     # the sum of the coefficients' sizes bounds the polynomial on all of the span
     rows = np.flatnonzero(np.linalg.norm(np.abs(g).sum(axis=0), axis=1) > tol.SOLUTION)
-    exceeds: Bool = np.linalg.norm(np.tensordot(POWERS_OF_POINTS, g[:, rows], axes=1), axis=2) > tol.SOLUTION
+    exceeds: Bool = _exceeds(_combine_nodes(POWERS_OF_POINTS, g[:, rows]))
     point, passes = exceeds.argmax(axis=0), exceeds.any(axis=0)
     rows, point = rows[passes], point[passes]
     ended[rows] = True
     low, high = POINTS[np.maximum(point - 1, 0)], POINTS[point]
     for _ in range(2 if len(rows) else 0):
         between = low + FINER_GRID * (high - low)
-        exceeds = np.linalg.norm(_evaluate(g[:, rows], between[1:]), axis=2) > tol.SOLUTION
+        exceeds = _exceeds(_evaluate(g[:, rows], between[1:]))
         exceeds[-1] = True
         point = exceeds.argmax(axis=0)
         low, high = between[point, np.arange(len(rows))], between[point + 1, np.arange(len(rows))]
