@@ -1,8 +1,6 @@
 """The goals of a batch, and the arrays of its results, with functions that write, pack and widen their rows."""
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +23,9 @@ class Goals(NamedTuple):
     target: Array
     near: Array
 
-    def of(self, rows: Int) -> Goals:
+    def of(self, rows: Int) -> Self:
         """The goals of some rows."""
-        return Goals(self.arm, self.task, self.target[rows], self.near[rows])
+        return self._replace(target=self.target[rows], near=self.near[rows])
 
 
 class Seeds(NamedTuple):
@@ -40,7 +38,7 @@ class Seeds(NamedTuple):
     simple: Bool  # (K, B) branches that need no examination, as no closed form doubts them
 
     @classmethod
-    def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Seeds:
+    def of(cls, q: Array, label: Int, loose: Bool | None = None, simple: Bool | None = None) -> Self:
         """Candidates without a known self-motion; by default none is loose and none is simple."""
         none, label = np.zeros(q.shape[:2], bool), np.broadcast_to(label, q.shape[:2])
         sure = np.zeros(q.shape, bool)

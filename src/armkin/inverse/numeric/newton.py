@@ -1,9 +1,7 @@
 """Newton corrections of joint values onto a task, for any arm and task, and a search by these from many starts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -176,7 +174,7 @@ class Linear(NamedTuple):
     V: Array
 
     @classmethod
-    def linearise(cls, arm: Arm, task: Task, q: Array, target: Array) -> Linear:
+    def linearise(cls, arm: Arm, task: Task, q: Array, target: Array) -> Self:
         """The residuals and Jacobians of postures (M, n) and their targets."""
         r, J = scaled(arm, task, q, target)
         return cls(r, *np.linalg.svd(J))

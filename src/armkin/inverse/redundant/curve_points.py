@@ -4,9 +4,7 @@ By Newton's method with the tangent, or a joint that is held, as the last equati
 Continuation Methods, 1990, 2 and 6).
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -79,7 +77,7 @@ class Ways(NamedTuple):
     end: Array
 
     @classmethod
-    def between(cls, follower: Follower, a: Points, b: Points) -> Ways:
+    def between(cls, follower: Follower, a: Points, b: Points) -> Self:
         """Cubics between points, which follow an arc of a circle to the sixth order."""
         chord = newton.difference(follower.arm, b.q, a.q)
         cosine = np.maximum((a.tangent * b.tangent).sum(axis=1), -1.0)

@@ -1,8 +1,6 @@
 """Families of an arm whose other joints have a closed form: its branches, followed along the redundant joint."""
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -33,7 +31,7 @@ class Followed(NamedTuple):
     steps: int = STEPS
 
     @classmethod
-    def along(cls, follower: Follower) -> Followed:
+    def along(cls, follower: Follower) -> Self:
         """Curves of the targets in two ways: those of which all places of a change are known, and others."""
         N = len(follower.target)
         parts, is_short, complete = [none(follower.arm.n)], np.zeros(N, bool), np.zeros(N, bool)

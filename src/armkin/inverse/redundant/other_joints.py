@@ -5,12 +5,10 @@ two branches appear and vanish, only where what is left to it is less than its b
 branches merge, and beside a straight shoulder or wrist, joints turn without bound.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +86,7 @@ class Follower(NamedTuple):
     target: Array
     near: Array
 
-    def of(self, rows: Int | slice) -> Follower:
+    def of(self, rows: Int | slice) -> Self:
         """For some of the targets."""
         return self._replace(target=self.target[rows], near=self.near[rows])
 

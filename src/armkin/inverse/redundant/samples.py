@@ -3,9 +3,7 @@
 All that stands of every sample is asked for a few targets at a time, while it is in the cache; what is kept is little.
 """
 
-from __future__ import annotations
-
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -28,7 +26,7 @@ class Changes(NamedTuple):
     set_before: Bool
 
     @classmethod
-    def of(cls, flags: Bool) -> Changes:
+    def of(cls, flags: Bool) -> Self:
         """All of flags (N, K, B)."""
         row, k, branch = np.nonzero(flags != np.roll(flags, -1, axis=1))
         return cls(row, k, branch, flags[row, k, branch])
