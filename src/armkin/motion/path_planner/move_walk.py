@@ -12,26 +12,25 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from armkin.errors import NoSolutionError, UsageError
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array
 from armkin.forward import fk
-from armkin.inverse.answers.solutions import Solutions, Status
-from armkin.inverse.branches.names import find_branches
-from armkin.inverse.solve import isolated_branches
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside_limits, outside_text
-from armkin.motion.branches.branch_path import Pace, carry_route, run_stretches, starts_at
-from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
+from armkin.motion.branches.branch_path import Pace, carry_route, starts_at
+from armkin.motion.branches.route_grid import Missed
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.joint_moves import approach_move, straight_move
 from armkin.motion.path_planner import branch_report
+from armkin.motion.path_planner.target_postures import target_postures
+from armkin.motion.path_planner.timed_run import note_deviation, timed_curves
 from armkin.motion.plan.path_plan import Marker, PathPlan, copy_plan
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, join_joint_paths, joint_path
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
-from armkin.motion.tool_path import path_numbers, piece_shapes
-from armkin.motion.tool_path.dense_points import FIT_SHARE, PLAN_SHARES, Polyline
+from armkin.motion.tool_path import path_numbers
+from armkin.motion.tool_path.dense_points import FIT_SHARE, Polyline
 from armkin.motion.tool_path.path_numbers import OF_JOINTS
 from armkin.motion.tool_path.path_pieces import MIN_LENGTH, Piece, Spot, split_target
 from armkin.motion.tool_path.route import join_pieces
@@ -40,7 +39,6 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
     from armkin.motion.branches.branch_chains import Run
-    from armkin.motion.timing.cubic_knots import Knots
     from armkin.motion.tool_path.route import Route
     from armkin.path_file import Move, PathFile
 
@@ -138,7 +136,7 @@ class Walk:
         if self.goal is None or self.pieces:
             self.close_group()
             return
-        postures = self.untried_postures or _postures(self, self.goal, self.goal_branch)
+        postures = self.untried_postures or self.postures(self.goal, self.goal_branch)
         self.goal_branch, self.untried_postures = None, postures[1:]
         if self.untried_postures:
             self.before_posture = None
@@ -154,7 +152,7 @@ class Walk:
         value = start if start is None or isinstance(start, str) else start.joints
         if start is not None and value is None:
             goal = self.target(start.point)  # type: ignore[union-attr, arg-type]
-            _nearest_posture(self, goal, None)  # raises here, so that the error names the key start
+            self.postures(goal, None)  # raises here, so that the error names the key start
             self.begin_group(goal)
             self.opening = True
         elif value is not None:
@@ -218,6 +216,10 @@ class Walk:
         """A target from the numbers of a move; numbers that it leaves out are those of the present target."""
         return path_numbers.target_spot(self.task, self.spot, value)
 
+    def postures(self, goal: Spot, branch: str | None) -> tuple[Array, ...]:
+        """Joint values of a target, nearest to the present ones first; branch: its name, None: that of the options."""
+        return target_postures(self.arm, self.task, goal, self.q, branch or self.options.branch)
+
     # Groups
 
     def close_group(self) -> None:
@@ -231,7 +233,7 @@ class Walk:
         """Plan the group: a joint move to a single target, else the runs of its route, with waits and grips."""
         if not self.pieces:
             if self.goal is not None:
-                self.append_joint_move(_nearest_posture(self, self.goal, self.goal_branch), self.leads)
+                self.append_joint_move(self.postures(self.goal, self.goal_branch)[0], self.leads)
                 for kind, value in self.pauses.get(0, ()):
                     self.emit_event(kind, value)
             self.goal = None
@@ -246,7 +248,7 @@ class Walk:
         s, runs = self._runs(route, near, any_branch=any_branch)
         for number, run in enumerate(runs):
             fixed = self.q if not any_branch and run.first == number == 0 and starts_at(run.chain, self.q) else None
-            curves, misses = _timed_curves(self.arm, self.pace, route, s, run, near, fixed)
+            curves, misses = timed_curves(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
                 self.append_joint_move(curves[0].start, self.leads if number == 0 else None)
             self.append_curves(add_detours(route, run.chain.windows), curves, order, misses)
@@ -282,7 +284,7 @@ class Walk:
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        _note_deviation(self.plan, route, join_joint_paths(curves), misses)
+        note_deviation(self.plan, route, join_joint_paths(curves), misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
@@ -296,66 +298,6 @@ class Walk:
             stretch = straight_move(self.arm, self.q, goal, speed, self.pace.accel, self.pace.jerk)
             self.stretches += [stretch] if stretch.duration > 0 else []
         self.q = goal
-
-
-def _timed_curves(
-    arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
-) -> tuple[list[Curve | Smoothed], Missed]:
-    """A run as timed curves, and its miss of given points: where that is too large, a smaller tolerance is tried."""
-    if not len(route.given_points[0]):
-        return run_stretches(arm, route, s, run, near, pace, fixed=fixed), None
-    for share in PLAN_SHARES:
-        tight_pace = replace(pace, tolerance=share * pace.tolerance)
-        curves = run_stretches(arm, route, s, run, near, tight_pace, fixed=fixed)
-        misses = largest_miss(arm, route, join_joint_paths(curves))
-        largest = 0.0 if misses is None else misses[0]
-        if largest <= pace.tolerance:
-            return curves, misses
-    raise NoSolutionError(
-        f"a given point would lie {largest:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
-        "tolerance, or fewer points at a time; nothing was moved",
-        deviation_mm=largest,
-        tolerance_mm=pace.tolerance,
-    )
-
-
-def _note_deviation(plan: PathPlan, route: Route, path: Knots, misses: Missed) -> None:
-    """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    deviation_mm = route.largest_detour + route_deviation(plan.arm, route, path) if misses is None else misses[0]
-    if misses is not None and deviation_mm > plan.deviation:
-        plan.rounded_most = plan.length + misses[1]
-    plan.deviation = max(plan.deviation, deviation_mm)
-    plan.note_singularity(path.q, path.s)
-
-
-def _nearest_posture(walk: Walk, goal: Spot, branch: str | None) -> Array:
-    """Joint values (n,) of a target, within limits and nearest to the present ones; branch: its name, None: any."""
-    return _postures(walk, goal, branch)[0]
-
-
-def _postures(walk: Walk, goal: Spot, branch: str | None) -> tuple[Array, ...]:
-    """Joint values of a target on all branches within limits, or on the named one, sorted by distance."""
-    target = piece_shapes.line(walk.task, goal, goal).targets(np.zeros(1))[0]
-    solutions = isolated_branches(walk.arm, target, walk.task.name, near=walk.q)
-    numbers = find_branches(solutions.names, branches) if (branches := branch or walk.options.branch) else None
-    clear = solutions.clear if walk.arm.keep_out and not walk.arm.ignores_keep_out else None
-    allowed = solutions.valid & solutions.within_limits & (True if clear is None else clear)
-    candidates = [row for row in solutions.order if numbers is None or solutions.branch[row] in numbers]
-    postures = tuple(solutions.q[row] for row in candidates if allowed[row])
-    if not postures:
-        raise _no_posture(solutions, goal, branches, clear)
-    return postures
-
-
-def _no_posture(solutions: Solutions, goal: Spot, branch_name: str | None, clear: Bool | None) -> NoSolutionError:
-    """The error of a target without a posture: out of reach, or every branch (of that name) hits or breaks a limit."""
-    point = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
-    if solutions.status == Status.UNREACHABLE:
-        return NoSolutionError(f"{point} is out of reach: nothing was moved")
-    on_branch = f" on branch '{branch_name}'" if branch_name else ""
-    if clear is not None and (solutions.within_limits & ~clear).any():
-        return NoSolutionError(f"{point} has no solution{on_branch} that hits nothing: nothing was moved")
-    return NoSolutionError(f"{point} has no solution within the limits{on_branch}: nothing was moved")
 
 
 def _copy_walk(walk: Walk) -> Walk:
