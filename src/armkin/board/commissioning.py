@@ -84,7 +84,8 @@ def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, 
     arm, machine = board.arm, board.machine
     if forget:
         board.adopt_robot_file()
-    home = ", ".join(f"{n} = {v:g}" for n, v in zip(arm.joint_names, units.joints_out(arm, arm.home), strict=True))
+    home_values = units.joints_out(arm, arm.home)
+    home = ", ".join(f"{name} = {value:g}" for name, value in zip(arm.joint_names, home_values, strict=True))
     if board.can("zero") and np.count_nonzero(arm.motor_gain) == arm.n:
         question = f"Zeros: hold the arm, its servos will be switched off. y: off; s: keep the file's zeros ({home})"
         if person.ask(question, "ys") == "s":

@@ -54,7 +54,8 @@ def stoppable() -> Iterator[Stop]:
     """Turn signals into a request that the arm be stopped first; then exit with 128 + signal."""
     stop = Stop()
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
-    old_handlers = {n: signal.signal(n, stop.caught) for n in (getattr(signal, s, None) for s in names) if n}
+    codes = (getattr(signal, name, None) for name in names)
+    old_handlers = {code: signal.signal(code, stop.caught) for code in codes if code}
     _active.append(stop)
     try:
         yield stop

@@ -225,7 +225,7 @@ def _check_determined(robot: RobotKeys, motors: tuple[Motor, ...]) -> Iterator[P
 def _eliminate(row: list[float], pivot: list[float], column: int) -> list[float]:
     """The row less so much of the pivot row that its number in the column is 0."""
     factor = row[column] / pivot[column]
-    return [x - factor * p for x, p in zip(row, pivot, strict=True)]
+    return [value - factor * pivot_value for value, pivot_value in zip(row, pivot, strict=True)]
 
 
 def _check_gripper(robot: RobotKeys) -> Iterator[Problem]:

@@ -46,7 +46,7 @@ def format_robot_file(keys: Mapping[str, Any], comments: Iterable[str] = ()) -> 
             continue
         lines.append(f"{key}:")
         for item in value:
-            entries = [f"{k}: {flow_text(v)}" for k, v in item.items()]
+            entries = [f"{name}: {flow_text(content)}" for name, content in item.items()]
             lines += [f"  {'-' if i == 0 else ' '} {entry}" for i, entry in enumerate(entries)]
     return "\n".join(lines) + "\n"
 

@@ -119,7 +119,8 @@ def _tidy_schema(part: Any) -> Any:
         return [_tidy_schema(value) for value in part]
     if not isinstance(part, dict):
         return part
-    tidy = {k: _tidy_schema(v) for k, v in part.items() if not (k == "title" and isinstance(v, str))}
+    titles = {name for name, content in part.items() if name == "title" and isinstance(content, str)}
+    tidy = {name: _tidy_schema(content) for name, content in part.items() if name not in titles}
     match tidy.get("allOf"):
         case [{"$ref": str(reference)}]:
             del tidy["allOf"]

@@ -100,7 +100,7 @@ def _note_bodies(keys: dict[str, Any], tree: Tree, base: str, joints: list[Joint
 
 def _greatest_radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
     """The greatest radius of shapes [mm]; None where one has no radius, or one beyond a kilometre."""
-    radii = [of.get("radius", "").strip() if tag in _ROUND else "" for tag, of in solids]
+    radii = [attributes.get("radius", "").strip() if tag in _ROUND else "" for tag, attributes in solids]
     if not radii or not all(_NUMBER.fullmatch(radius) for radius in radii):
         return None
     greatest = tidy(max(map(float, radii)) * METRE, 9)

@@ -105,7 +105,8 @@ def without_board(arm: Arm) -> list[Lack]:
     """A missing board, driver or axis, which motion on a board needs."""
     if arm.board is None:
         kind = _board_for(arm)
-        driver = f", driver: {_DRIVER}" if any(m.kind == "stepper" for m in arm.motors) or undriven_joints(arm) else ""
+        has_steppers = any(motor.kind == "stepper" for motor in arm.motors) or undriven_joints(arm)
+        driver = f", driver: {_DRIVER}" if has_steppers else ""
         choice = f"kinds: {', '.join(board_catalogue.kind_names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
     foreign = board_catalogue.foreign_board(arm.board.kind)

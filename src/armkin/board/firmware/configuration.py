@@ -152,10 +152,12 @@ def _count_limits(arm: Arm) -> tuple[list[int], list[int]]:
                 ends[side].append(max(-_NO_LIMIT, min(_NO_LIMIT, int(pulses(arm, corner)[motor]))))
             else:
                 ends[side].append(sign * _NO_LIMIT)
-    servo = pulse_range(arm)
-    low = [max(a, int(s)) if s > -math.inf else a for a, s in zip(ends[0], servo[:, 0], strict=True)]
-    high = [min(a, int(s)) if s < math.inf else a for a, s in zip(ends[1], servo[:, 1], strict=True)]
-    return low, high
+    for motor, (shortest, longest) in enumerate(pulse_range(arm)):
+        if shortest > -math.inf:
+            ends[0][motor] = max(ends[0][motor], int(shortest))
+        if longest < math.inf:
+            ends[1][motor] = min(ends[1][motor], int(longest))
+    return ends[0], ends[1]
 
 
 def _limit_rows(arm: Arm, board: Board, axes: tuple[int, ...], low: list[int], high: list[int]) -> tuple[RowImage, ...]:

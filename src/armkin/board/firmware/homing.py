@@ -113,7 +113,7 @@ def home_joints(
     lost_before, lost_steps = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
     for group in _groups_in_order(arm, pending):
-        for search in (s for s in pending if s.joint in group):
+        for search in [search for search in pending if search.joint in group]:
             name = arm.joint_names[search.joint]
             announce(name)
             status, edge = _run_search(machine, search)
@@ -231,7 +231,7 @@ def _search_of(arm: Arm, configuration: Configuration, joint: int) -> Search:
     for axis, value in zip(configuration.axes, gain * homing.direction * speed, strict=True):
         rate[axis] = int(np.rint(value))
     leader = float(np.abs(gain).max())
-    fastest, slowest = max(map(abs, rate)), min((abs(r) for r in rate if r), default=0)
+    fastest, slowest = max(map(abs, rate)), min((abs(axis_rate) for axis_rate in rate if axis_rate), default=0)
     if fastest > _MAX_COUNTS or slowest < 1:
         raise UsageError(
             f"joint {name}: homing.speed {homing.speed:g} is {leader * speed:.4g} counts/s; 1 to {_MAX_COUNTS} can be"

@@ -181,7 +181,7 @@ def motion_batches(
     begin_counts = [int(move.start[k]) for k in motors]
     room = min(session.info.frame - 4, session.info.receive - QUESTION_BYTES - 6)
     places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
-    source = (s.for_axes(motors) for s in move.segments)
+    source = (segment.for_axes(motors) for segment in move.segments)
     segments: list[Segment] = list(islice(source, _RECKONED_SEGMENTS))
     sizes = _insert_pause(session, segments, room, clock, min_pause) if segments else []
     is_start = not sizes
@@ -195,8 +195,8 @@ def motion_batches(
         part, segments = segments[:n], segments[n:]
         if not segments:
             segments = list(islice(source, 1))
-        places = [p + sum(s.ticks * s.rates[i] for s in part) for i, p in enumerate(places)]
-        end = [p // protocol.STEP for p in places]
+        places = [place + sum(segment.ticks * segment.rates[i] for segment in part) for i, place in enumerate(places)]
+        end = [place // protocol.STEP for place in places]
         yield MotionFrame(
             axes=[axes[k] for k in motors],
             start=begin_counts,
@@ -227,7 +227,7 @@ def _insert_pause(session: Session, segments: list[Segment], room: int, clock: i
 
 def seconds_of(segments: Sequence[Segment], clock: int) -> float:
     """The duration [s] of segments; clock: cycles a second."""
-    return sum(s.units() for s in segments) * 256 / clock
+    return sum(segment.units() for segment in segments) * 256 / clock
 
 
 def _fitting_count(segments: Sequence[Segment], limit: int, room: int) -> int:

@@ -24,7 +24,8 @@ class Spindle:
     def __init__(self, session: Session) -> None:
         self._session = session
         answer = (replies.parse_spindle(line) for line in session.ask("$G"))
-        self.value = next((s for s in answer if s is not None), None)  # the active S word; None: off, or unknown
+        # the active S word; None: off, or unknown
+        self.value = next((speed for speed in answer if speed is not None), None)
 
     def grip(self, gripper: Gripper, value: float, settings: Mapping[int, float]) -> float:
         """Set an S word, wait for the gripper, and return the word.

@@ -91,8 +91,14 @@ class GrblBoard(Board):
     def settings(self) -> list[dict[str, Any]]:
         """Settings that are not as the robot file wants them."""
         return [
-            {"setting": d.number, "what": d.meaning, "found": d.actual, "wanted": d.expected, "serious": d.serious}
-            for d in self.machine.setting_differences()
+            {
+                "setting": difference.number,
+                "what": difference.meaning,
+                "found": difference.actual,
+                "wanted": difference.expected,
+                "serious": difference.serious,
+            }
+            for difference in self.machine.setting_differences()
         ]
 
     def write_settings(self) -> None:

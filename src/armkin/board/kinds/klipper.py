@@ -74,7 +74,8 @@ class KlipperBoard(Board):
     def settings(self) -> list[dict[str, Any]]:
         """Options of printer.cfg that are not as the robot file wants them."""
         return [
-            {"setting": d.setting, "found": d.actual, "wanted": d.expected} for d in self.machine.setting_differences()
+            {"setting": difference.setting, "found": difference.actual, "wanted": difference.expected}
+            for difference in self.machine.setting_differences()
         ]
 
 

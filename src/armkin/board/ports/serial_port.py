@@ -253,4 +253,4 @@ def list_ports() -> list[Found]:
             continue  # a mainboard's empty ttyS
         adapter = _ADAPTER_NAMES.get((port.vid or 0, port.pid or 0), "")
         ports.append(Found(port.device, port.description or "", port.hwid or "", board, adapter))
-    return sorted(ports, key=lambda f: (not f.board, f.device))
+    return sorted(ports, key=lambda entry: (not entry.board, entry.device))

@@ -15,7 +15,7 @@ def limit_rule_holds(lower: int, upper: int, old_count: int, new_count: int) -> 
 
 def row_value(row: RowImage, counts: list[int]) -> int:
     """Sum of weight x count."""
-    return sum(w * c for w, c in zip(row.weight, counts, strict=True))
+    return sum(weight * count for weight, count in zip(row.weight, counts, strict=True))
 
 
 class Axes:
@@ -34,9 +34,9 @@ class Axes:
 
     def add_steps(self, steps: list[int]) -> None:
         """Add completed steps."""
-        self.base = [b + m for b, m in zip(self.base, steps, strict=True)]
-        self.net = [b + m for b, m in zip(self.net, steps, strict=True)]
+        self.base = [count + step for count, step in zip(self.base, steps, strict=True)]
+        self.net = [count + step for count, step in zip(self.net, steps, strict=True)]
 
     def lose(self, rates: Sequence[int]) -> None:
         """Forget the counts of the axes that move at these rates."""
-        self.known &= ~sum(1 << i for i, r in enumerate(rates) if r)
+        self.known &= ~sum(1 << i for i, rate in enumerate(rates) if rate)

@@ -128,7 +128,7 @@ class Commands:
 
     def _check_rates(self, rate: Sequence[int], *, jogging: bool) -> None:
         """Raise unless axes may move at these rates without a plan."""
-        moving_axes = [i for i, r in enumerate(rate) if r]
+        moving_axes = [i for i, axis_rate in enumerate(rate) if axis_rate]
         is_slow = jogging and not all(self._axis_known(i) for i in moving_axes)
         for i in moving_axes:
             servo = self._setup.servo(i)

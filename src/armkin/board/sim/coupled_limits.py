@@ -16,22 +16,22 @@ class CoupledLimits:
 
     def check(self, counts: list[int], known_axes: int) -> None:
         """Raise RefusedError if a segment that ends at `counts` takes a joint out of its limits."""
-        for r, row in enumerate(self._image.rows):
+        for number, row in enumerate(self._image.rows):
             end_value, slack = row_value(row, counts), sum(map(abs, row.weight))
-            low, high = min(row.lower, self._nearest[r] - slack), max(row.upper, self._nearest[r] + slack)
+            low, high = min(row.lower, self._nearest[number] - slack), max(row.upper, self._nearest[number] + slack)
             is_outside = (end_value < row.lower and end_value < low) or (end_value > row.upper and end_value > high)
-            if is_outside and all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w):
-                raise RefusedError(Error.LIMIT_JOINT, r)
+            if is_outside and all(known_axes >> i & 1 for i, weight in enumerate(row.weight) if weight):
+                raise RefusedError(Error.LIMIT_JOINT, number)
             is_nearest = (
-                end_value > self._nearest[r]
+                end_value > self._nearest[number]
                 if end_value < row.lower
-                else end_value <= row.upper or end_value < self._nearest[r]
+                else end_value <= row.upper or end_value < self._nearest[number]
             )
             if is_nearest:
-                self._nearest[r] = end_value
+                self._nearest[number] = end_value
 
 
 def leads_to_switch(guard: GuardImage, rates: Sequence[float]) -> bool:
     """Whether axes that move at these rates lead on into a switch."""
-    parts = [w * r for w, r in zip(guard.weight, rates, strict=True)]
+    parts = [weight * rate for weight, rate in zip(guard.weight, rates, strict=True)]
     return sum(parts) > max(map(abs, parts)) / 16

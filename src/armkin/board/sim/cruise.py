@@ -23,25 +23,26 @@ class Cruise:
     @property
     def slope(self) -> float:
         """The greatest change of the share in a second within all accelerations."""
-        return min((self.axes.image.axes[i].max_accel / abs(r) for i, r in enumerate(self.rate) if r), default=1e9)
+        axes = zip(self.axes.image.axes, self.rate, strict=True)
+        return min((axis.max_accel / abs(rate) for axis, rate in axes if rate), default=1e9)
 
     @property
     def braking(self) -> float:
         """Counts that the fastest axis needs to stop."""
-        return self.share**2 / (2 * self.slope) * max(abs(r) for r in self.rate)
+        return self.share**2 / (2 * self.slope) * max(abs(rate) for rate in self.rate)
 
     def velocity(self) -> list[float]:
         """The present velocity of every axis."""
-        return [r * self.share for r in self.rate]
+        return [rate * self.share for rate in self.rate]
 
     def glide(self, target: float) -> None:
         """Move for one millisecond, with the share approaching `target`."""
         old_share, step = self.share, self.slope * _TICK_TIME
         self.share = min(old_share + step, target) if target > old_share else max(old_share - step, target)
         mean_time = (old_share + self.share) / 2 * _TICK_TIME
-        self.travel += mean_time * max(abs(r) for r in self.rate)
-        total = [d + r * mean_time for d, r in zip(self._done, self.rate, strict=True)]
-        steps = [int(t) - int(d) for t, d in zip(total, self._done, strict=True)]
+        self.travel += mean_time * max(abs(rate) for rate in self.rate)
+        total = [old + rate * mean_time for old, rate in zip(self._done, self.rate, strict=True)]
+        steps = [int(new) - int(old) for new, old in zip(total, self._done, strict=True)]
         self._done = total
         self.axes.add_steps(steps)
 
@@ -50,7 +51,8 @@ class Cruise:
         image, base, known_axes = self.axes.image, self.axes.base, self.axes.known
         share = min(self.share + self.slope * _TICK_TIME, 1.0)
         stop_time = share * _TICK_TIME + share * share / (2 * self.slope) + share * _TICK_TIME
-        stop_counts = [b + round(r * stop_time + (r > 0) - (r < 0)) for b, r in zip(base, self.rate, strict=True)]
+        stop_steps = [round(rate * stop_time + (rate > 0) - (rate < 0)) for rate in self.rate]
+        stop_counts = [count + steps for count, steps in zip(base, stop_steps, strict=True)]
         for i, axis in enumerate(image.axes):
             if (
                 self.rate[i]
@@ -59,7 +61,7 @@ class Cruise:
             ):
                 return False
         for row in image.rows:
-            if all(known_axes >> i & 1 for i, w in enumerate(row.weight) if w) and not limit_rule_holds(
+            if all(known_axes >> i & 1 for i, weight in enumerate(row.weight) if weight) and not limit_rule_holds(
                 row.lower, row.upper, row_value(row, base), row_value(row, stop_counts)
             ):
                 return False

@@ -79,7 +79,7 @@ def _weights_valid(weights: Sequence[int], axes: Sequence[AxisImage]) -> bool:
 def _row_valid(row: RowImage, axes: Sequence[AxisImage]) -> bool:
     """Whether the bounds of a coupled limit are in order, and its sum fits the board's integers."""
     reach = zip(row.weight, axes, strict=True)
-    max_sum = sum(abs(w) * max(abs(axis.lower), abs(axis.upper)) for w, axis in reach)
+    max_sum = sum(abs(weight) * max(abs(axis.lower), abs(axis.upper)) for weight, axis in reach)
     return row.lower <= row.upper and max_sum < _MAX_COUNTS
 
 

@@ -41,7 +41,8 @@ class Words:
 
     def waits(self) -> bool:
         """Whether GRBL carries out all motion before it obeys this line."""
-        return self.spindle is not None or any(g in self.codes for g in (4, 10, 28, 43.1, 49, 92, 92.1, *range(54, 60)))
+        waiting_codes = (4, 10, 28, 43.1, 49, 92, 92.1, *range(54, 60))
+        return self.spindle is not None or any(code in self.codes for code in waiting_codes)
 
 
 @dataclass
@@ -167,11 +168,11 @@ class Modes:
             self.g92 = [0.0] * self.axes
         elif 92.0 in words.codes:
             base = [a + b for a, b in zip(self.offsets[self.system], self.tool, strict=True)]
-            self.g92 = [position[k] - base[k] - axes[k] if k in axes else v for k, v in enumerate(self.g92)]
+            self.g92 = [position[k] - base[k] - axes[k] if k in axes else old for k, old in enumerate(self.g92)]
         elif 10.0 in words.codes:
             self._store_offset(words.values, axes, position)
         else:
-            self.tool = [axes.get(k, v) for k, v in enumerate(self.tool)]
+            self.tool = [axes.get(k, old) for k, old in enumerate(self.tool)]
 
     def _set_mode(self, code: float) -> None:
         """Take over one modal G code."""

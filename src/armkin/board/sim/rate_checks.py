@@ -121,7 +121,8 @@ class Velocity:
             raise RefusedError(Error.ACCEL, axis)
         growth = _quarter_velocity(first, last, pace.windows) - _quarter_velocity(last_end, start, last_pace.windows)
         excess = (0, 0) if last_pace.windows else self._excess[axis]
-        excess_up, excess_down = (max(0, e + m - (budget >> 2)) for e, m in zip(excess, (growth, -growth), strict=True))
+        excess_up = max(0, excess[0] + growth - (budget >> 2))
+        excess_down = max(0, excess[1] - growth - (budget >> 2))
         self._excess[axis] = excess_up, excess_down
         if max(excess_up, excess_down) > slack >> 2:
             raise RefusedError(Error.ACCEL, axis)

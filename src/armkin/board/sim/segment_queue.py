@@ -100,7 +100,7 @@ class Queue:
 
     def velocity(self) -> list[float]:
         """Every axis's velocity just now, in any unit."""
-        return [float(r) for r in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.axes.base)
+        return [float(rate) for rate in self._queue[0].segment.rates] if self._queue else [0.0] * len(self.axes.base)
 
     def run(self, seconds: float) -> QueuedSegment | None:
         """Let time pass; returns the last segment if it has ended. Axes that stop too abruptly lose their position."""

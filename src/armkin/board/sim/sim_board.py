@@ -152,9 +152,9 @@ class SimBoard:
         self._out += protocol.encode_frame(payload)
 
     def _send_ack(self) -> None:
-        m = self.motors
+        queue = self.motors.queue
         ack = protocol.Ack(
-            self._next, self._error, self._detail, m.state, m.queue.free, m.queue.milliseconds(), self._digest
+            self._next, self._error, self._detail, self.motors.state, queue.free, queue.milliseconds(), self._digest
         )
         self._send(protocol.pack_ack(ack))
 
@@ -189,13 +189,13 @@ class SimBoard:
         return sum(flag for flag, is_set in pairs if is_set)
 
     def _send_status(self, tag: int, page: int) -> None:
-        m = self.motors
+        motors, queue = self.motors, self.motors.queue
         page = int(page == 1)
         switches = sum(self.inputs.level(i) << i for i in range(len(self.board.switches)))
-        counts = tuple(m.homing.latch if page else m.counts())
+        counts = tuple(motors.homing.latch if page else motors.counts())
         status = Status(
-            tag, self._next, self._error, self._detail, m.state, self._flags(), m.queue.free, m.queue.milliseconds(),
-            m.axes.known,
+            tag, self._next, self._error, self._detail, motors.state, self._flags(), queue.free, queue.milliseconds(),
+            motors.axes.known,
             switches, 0, min(self._splitter.bad, 255), page, self._digest, counts,
         )  # fmt: skip
         self._send(protocol.pack_status(status))

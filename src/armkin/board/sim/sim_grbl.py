@@ -297,8 +297,8 @@ class Grbl(SimulatedTime):
             return self._jog(words, position)
         goal = self.modes.obey(words, _machine_position(self.settings, position))
         if words.spindle is not None:
-            s = min(words.values.get("S", 0.0), self.settings[30])
-            self.spindle = s if words.spindle in (3.0, 4.0) else None
+            speed = min(words.values.get("S", 0.0), self.settings[30])
+            self.spindle = speed if words.spindle in (3.0, 4.0) else None
         if 4.0 in words.codes:
             self._blocks.append(Block((), (), words.values["P"], 0, 0, 0, line=False))
             return -1
@@ -332,14 +332,14 @@ def _block_to(
 ) -> Block | None:
     """A block to a goal in units; None: nothing to do."""
     steps_per_unit = [settings[100 + k] for k in range(len(start))]
-    end = [round(value * p) for value, p in zip(goal, steps_per_unit, strict=True)]
-    change = [(b - a) / s for a, b, s in zip(start, end, steps_per_unit, strict=True)]
+    end = [round(value * scale) for value, scale in zip(goal, steps_per_unit, strict=True)]
+    change = [(end_count - count) / scale for count, end_count, scale in zip(start, end, steps_per_unit, strict=True)]
     length = math.hypot(*change)
     if length == 0.0:
         return None
-    share = [abs(c) / length for c in change]
-    max_speed = min(settings[110 + k] / 60 / s for k, s in enumerate(share) if s)
-    accel = min(settings[120 + k] / s for k, s in enumerate(share) if s)
+    shares = [abs(travel) / length for travel in change]
+    max_speed = min(settings[110 + k] / 60 / share for k, share in enumerate(shares) if share)
+    accel = min(settings[120 + k] / share for k, share in enumerate(shares) if share)
     return Block(tuple(start), tuple(end), length, feed, max_speed, accel, jog)
 
 

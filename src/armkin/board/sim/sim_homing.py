@@ -39,28 +39,28 @@ class Homing:
         self._until = self._cruise.now + search.time
         return self._phases(search)
 
-    def _phases(self, s: Search) -> Iterator[None]:
+    def _phases(self, search: Search) -> Iterator[None]:
         """Leave the switch, find its edge fast, back off, find it slowly."""
-        reverse = [-r for r in s.rate]
-        if self._is_pressed(s) and not (
-            yield from self._find_edge(s, reverse, s.slow, False, 2 * s.backoff, Error.SWITCH)
+        reverse = [-rate for rate in search.rate]
+        if self._is_pressed(search) and not (
+            yield from self._find_edge(search, reverse, search.slow, False, 2 * search.backoff, Error.SWITCH)
         ):
             return
-        if not (yield from self._find_edge(s, s.rate, 1.0, True, s.travel, Error.TRAVEL)):
+        if not (yield from self._find_edge(search, search.rate, 1.0, True, search.travel, Error.TRAVEL)):
             return
-        if not (yield from self._slide(reverse, 1.0, lambda: self._is_backed_off(s), 2**31, Error.SWITCH)):
+        if not (yield from self._slide(reverse, 1.0, lambda: self._is_backed_off(search), 2**31, Error.SWITCH)):
             return
-        if self._is_pressed(s):
+        if self._is_pressed(search):
             self._fault(Error.SWITCH)
-        elif (yield from self._find_edge(s, s.rate, s.slow, True, 2 * s.backoff, Error.SWITCH)):
+        elif (yield from self._find_edge(search, search.rate, search.slow, True, 2 * search.backoff, Error.SWITCH)):
             self.latched = True
 
     def _find_edge(
-        self, s: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
+        self, search: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
     ) -> Generator[None, None, bool]:
         """Move until the switch is steadily pressed, or released."""
         self._switch_time = -1.0
-        return self._slide(vector, share, lambda: self._is_steady(s, pressed), limit, error)
+        return self._slide(vector, share, lambda: self._is_steady(search, pressed), limit, error)
 
     def _slide(
         self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
@@ -83,13 +83,13 @@ class Homing:
         yield  # a millisecond at rest between two motions
         return True
 
-    def _is_pressed(self, s: Search) -> bool:
-        return self._level(s.switch) == s.closed
+    def _is_pressed(self, search: Search) -> bool:
+        return self._level(search.switch) == search.closed
 
-    def _is_steady(self, s: Search, pressed: bool) -> bool:
+    def _is_steady(self, search: Search, pressed: bool) -> bool:
         """Whether the switch has had a level for long enough; latches the counts of the change."""
         present = self._cruise.now
-        if self._is_pressed(s) != pressed:
+        if self._is_pressed(search) != pressed:
             self._switch_time = -1.0
         elif self._switch_time < 0:
             self._switch_time, self._switch_counts = present, list(self._cruise.axes.base)
@@ -98,9 +98,9 @@ class Homing:
             self.latch = self._switch_counts
         return is_steady
 
-    def _is_backed_off(self, s: Search) -> bool:
+    def _is_backed_off(self, search: Search) -> bool:
         """Whether braking now ends at the back-off distance."""
-        leader = max(range(len(s.rate)), key=lambda i: abs(s.rate[i]))
+        leader = max(range(len(search.rate)), key=lambda i: abs(search.rate[i]))
         if self._cruise.travel == 0:
             self._beyond = abs(self._cruise.axes.base[leader] - self.latch[leader])
-        return self._cruise.travel + self._cruise.braking >= s.backoff + self._beyond
+        return self._cruise.travel + self._cruise.braking >= search.backoff + self._beyond

@@ -242,7 +242,8 @@ class Klipper(SimulatedTime):
         seconds = length / min([self.feed / 60, *allowed])
         speeds = {name: change[name] / seconds for name in self.axes}
         if change["X"] and self._moves:
-            self.jumps += sum(abs(v - self._speeds.get(k, 0.0)) > self.steppers[k].corner for k, v in speeds.items())
+            changes = {motor: abs(speed - self._speeds.get(motor, 0.0)) for motor, speed in speeds.items()}
+            self.jumps += sum(change > self.steppers[motor].corner for motor, change in changes.items())
         self._speeds = speeds if change["X"] else {}
         self._moves.append(Move(start, end, seconds))
         self.x = end["X"]

@@ -104,7 +104,7 @@ class Cutter:
         corrects of earlier pieces, as a share of its own travel; None: all. unheard: no motor makes a step in it, so
         that the short form is enough.
         """
-        aims = [round(c * STEP) + HALF for c in counts]
+        aims = [round(count * STEP) + HALF for count in counts]
         corrections = self._owed(aims, seconds, make_up)
         travels = [aim - last_aim + x for aim, last_aim, x in zip(aims, self._aims, corrections, strict=True)]
         self._aims = aims
@@ -120,7 +120,7 @@ class Cutter:
         else:
             segment = self._ramp_segment(cycles, travels, steps, change)
         segment = self._no_shorter(segment)
-        self.places = [p + segment.ticks * r for p, r in zip(self.places, segment.rates, strict=True)]
+        self.places = [place + segment.ticks * rate for place, rate in zip(self.places, segment.rates, strict=True)]
         # Time lost to the shortest interval is not corrected later.
         self.late = min(cycles - cycles_of(segment), float(segment.ticks))
         return segment

@@ -108,8 +108,8 @@ class CurveSegments:
         counts = exact_pulses(self.arm, self.stretch.evaluate(t))
         for offset, time_to_end in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
             span = np.sqrt(6 * np.abs(offset) / (_SETTLING_SHARE * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6
-            f = np.clip(time_to_end[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
-            counts = counts + offset * (1 - f * f * (3 - 2 * f))
+            fraction = np.clip(time_to_end[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
+            counts = counts + offset * (1 - fraction * fraction * (3 - 2 * fraction))
         return np.asarray(counts)
 
     def _smooth_segment(self, cutter: Cutter, part: _Part) -> tuple[Segment, Array]:
@@ -143,12 +143,12 @@ class CurveSegments:
         gain = self.arm.motor_gain.T
         speed = np.linalg.norm(self.stretch.evaluate(t, 1) @ gain, axis=1).tolist()
         change = np.array([speed_change(a, b) for a, b in pairwise(speed)])
-        h = np.diff(t)[:, None]
+        interval = np.diff(t)[:, None]
         max_accel = _JUMP_FACTOR * motor_accel(self.arm)
-        ramp = change[:, None] * steps / h**2  # each motor's acceleration in the segment
+        ramp = change[:, None] * steps / interval**2  # each motor's acceleration in the segment
         size = np.maximum(np.abs(ramp), 1e-12)
         share = np.minimum((max_accel / size).min(axis=1), 1.0)
-        reserve = np.maximum(self._max_rates() * h / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
+        reserve = np.maximum(self._max_rates() * interval / np.maximum(np.abs(steps), 1e-12) - 1, 0.0).min(axis=1)
         share = np.minimum(share, 2 * reserve / np.maximum(np.abs(change), 1e-12))
         for end in (self.stretch.evaluate(t[:-1] + 1e-9, 2) @ gain, self.stretch.evaluate(t[1:] - 1e-9, 2) @ gain):
             room = (np.maximum(max_accel + end * np.sign(ramp), 0.0) / size).min(axis=1)
@@ -196,12 +196,12 @@ class CurveSegments:
         A chord counts as unlimited (inf) where a bound from the arm's reach shows that it may be longer than any
         segment.
         """
-        arm, qd, qdd = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
-        stop = (np.abs(qd @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
+        arm, dq, ddq = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
+        stop = (np.abs(dq @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
         lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
-        limited = np.flatnonzero(np.abs(qdd) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
+        limited = np.flatnonzero(np.abs(ddq) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
         J = jacobian(arm, self.stretch.evaluate(t[limited]))[:, :3]
-        v, accel = ((J @ x[limited, :, None])[..., 0] for x in (qd, qdd))
+        v, accel = ((J @ x[limited, :, None])[..., 0] for x in (dq, ddq))
         tangent = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
         normal_accel = np.linalg.norm(accel - tangent * (tangent * accel).sum(axis=1, keepdims=True), axis=1)
         span = np.full(len(t), np.inf)
@@ -218,8 +218,8 @@ def _least_spans(stop: Array, step: float) -> Array:
     shortest = needed.copy()
     if float(needed.max(initial=0.0)) <= _MIN_SECONDS:  # segments are never shorter
         return shortest
-    for d in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
-        shortest[d:] = np.maximum(shortest[d:], np.where(stop[:-d] >= d * step, needed[:-d], 0.0))
+    for shift in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
+        shortest[shift:] = np.maximum(shortest[shift:], np.where(stop[:-shift] >= shift * step, needed[:-shift], 0.0))
     return shortest
 
 

@@ -49,7 +49,7 @@ def left_of(
     first, present = plans[0], np.array(counts, dtype=np.int64)
     if move == 0 and (present == first.start).all():
         return plans, Place(0, 0, 0.0, 0.0)
-    place = next((p for p in places_on([first], present) if p.stretch == move), None)
+    place = next((candidate for candidate in places_on([first], present) if candidate.stretch == move), None)
     if place is None:
         return None
     remaining = remaining_trajectory(first, place, joints(first.trajectory.arm, present))
@@ -78,9 +78,9 @@ def _times_on_segments(
     start: np.ndarray, segments: Sequence[Segment], duration: float, counts: np.ndarray
 ) -> Iterator[float]:
     """The time [s] of each segment that passes the counts, where it is nearest to them; duration: of all segments."""
-    steps = np.array([[s.ticks * rate for rate in s.rates] for s in segments]) / STEP
+    steps = np.array([[segment.ticks * rate for rate in segment.rates] for segment in segments]) / STEP
     ends = start + np.vstack([np.zeros(len(counts)), np.cumsum(steps, axis=0)])
-    ticks = np.cumsum([0.0, *(s.ticks * (s.interval + s.last_interval) / 2 for s in segments)])
+    ticks = np.cumsum([0.0, *(segment.ticks * (segment.interval + segment.last_interval) / 2 for segment in segments)])
     times = ticks / ticks[-1] * duration
     for (a, b), (t0, t1) in zip(pairwise(ends), pairwise(times.tolist()), strict=True):
         travel = b - a

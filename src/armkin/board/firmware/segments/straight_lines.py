@@ -108,7 +108,7 @@ class LineSegments:
                 seconds = (b - a) * (UNHEARD_SHARE if unheard else 1.0)
                 yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP_SHARE, unheard)
                 unheard = False
-        if [p // STEP for p in cutter.places] != self.end.tolist():
+        if [place // STEP for place in cutter.places] != self.end.tolist():
             raise AssertionError("a line's rates do not lead to its end")
 
     @property

@@ -72,8 +72,8 @@ class Image:
             marks = a.used | a.invert << 1
             packed += struct.pack("<BiiiII", marks, a.lower, a.upper, a.home, a.max_rate, a.max_accel)
         packed += b"".join(guard.pack(n) for guard in self.guards)
-        for r in self.rows:
-            packed += struct.pack(f"<ii{n}h", r.lower, r.upper, *r.weight)
+        for row in self.rows:
+            packed += struct.pack(f"<ii{n}h", row.lower, row.upper, *row.weight)
         return packed
 
     @classmethod

@@ -78,7 +78,7 @@ class Window:
     @property
     def seconds(self) -> float:
         """Seconds of motion that are not acknowledged."""
-        return sum(f.seconds for f in self._waiting) + sum(f.seconds for f, _ in self._sent)
+        return sum(frame.seconds for frame in self._waiting) + sum(frame.seconds for frame, _ in self._sent)
 
     def send(self) -> None:
         """Send new frames as far as credit and window allow, and send all again after a time without answers."""

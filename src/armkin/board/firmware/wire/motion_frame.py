@@ -60,7 +60,7 @@ class MotionFrame:
     @property
     def seconds(self) -> float:
         """The approximate duration."""
-        return sum(s.units() for s in self.segments) * 256 / self.clock
+        return sum(segment.units() for segment in self.segments) * 256 / self.clock
 
     def payload(self, tag: int) -> bytes:
         """The payload of this motion's frame."""

@@ -68,7 +68,7 @@ class Segment:
     @property
     def narrow(self) -> bool:
         """Whether it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
-        coarse = all(r % COARSE_UNIT == 0 or abs(r) == _MAX_RATE for r in self.rates)
+        coarse = all(rate % COARSE_UNIT == 0 or abs(rate) == _MAX_RATE for rate in self.rates)
         return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
 
     @property
@@ -113,7 +113,7 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
     """
     exact = (step * STEP / ticks for step in steps)
     short = ticks <= 255
-    rates = (_coarse_rate(r) if short else nearest_rate(r) for r in exact)
+    rates = (_coarse_rate(rate) if short else nearest_rate(rate) for rate in exact)
     return Segment(ticks, interval, add * 256, tuple(rates))
 
 
@@ -140,6 +140,7 @@ def read_segment(raw: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
         return Segment(ticks, interval, add * 256, tuple(map(_full_rate, short)))
     ticks, interval = struct.unpack_from("<HH", raw)
     bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", raw, 7)
-    rates = tuple(r if fine >> i & 1 and r != -FINE_BOUND else _full_rate(r) for i, r in zip(axes, short, strict=True))
+    is_fine = (fine >> axis & 1 and rate != -FINE_BOUND for axis, rate in zip(axes, short, strict=True))
+    rates = tuple(rate if fine_rate else _full_rate(rate) for rate, fine_rate in zip(short, is_fine, strict=True))
     add = int.from_bytes(raw[4:7], "little", signed=True)
     return Segment(ticks, interval, add, rates, bend, quick=bool(fine >> 15))
