@@ -17,8 +17,6 @@ quartic for joint c; if not, a combination of the two equations has only g. Join
 the loop is a planar arm of three joints or a wrist: 8 branches.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
@@ -58,7 +56,7 @@ def recognise(arm: Arm, task: Task, tolerance: float = tol.EXACT) -> Geometry | 
     return None
 
 
-def _class_of(loop: _Loop, names: Sequence[int]) -> Geometry:
+def _class_of(loop: "_Loop", names: Sequence[int]) -> Geometry:
     """The class of a loop, whose chain has joints with these numbers (0..5)."""
     axes = sorted(names[i] + 1 for i in range(loop.first, loop.first + 3))
     relation, name = "meet in a point", "three axes that meet"
@@ -156,7 +154,7 @@ class _Loop:
         self.wrist = Wrist(*two)
 
     @classmethod
-    def of(cls, chain: Chain, first: int, tolerance: float, reach: float) -> _Loop | None:
+    def of(cls, chain: Chain, first: int, tolerance: float, reach: float) -> "_Loop | None":
         """The loop, if the three axes from the first one on are parallel or meet; None if they do neither."""
         L1, L2 = chain.link[first + 1], chain.link[first + 2]
         if is_parallel(L1, tolerance) and is_parallel(L2, tolerance):

@@ -1,7 +1,5 @@
 """The interface of a class of arms: its solver and properties."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -48,6 +46,6 @@ class Geometry:
     ordered: bool = True  # whether a branch keeps its index along a path; else `branches.tracking` is used
     elimination: Any = None  # prepared elimination behind `rows`, if any
     ends: tuple[int, ...] = ()  # joints that, if free, may have only a few values with solutions
-    doubts: Geometry | None = None  # slower solver for the targets that `pairs` doubts
+    doubts: "Geometry | None" = None  # slower solver for the targets that `pairs` doubts
     places: Callable[[Array, Array], Int] | None = None  # indices of an elimination's branches
     branches: int | None = None  # columns of `rows` with names; later ones are numbered

@@ -8,8 +8,6 @@ shape (2, 2, 1, N), and broadcast against quantities that do not depend on them.
 `axis` chooses the axis (`signs`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -92,14 +90,14 @@ class Doubt:
 
     __array_ufunc__ = None  # an array on the left of | leaves it to this class
 
-    def __or__(self, other: Doubt | Bool) -> Doubt:
+    def __or__(self, other: "Doubt | Bool") -> "Doubt":
         if isinstance(other, Doubt):
             return Doubt(self.edge | other.edge, self.free | other.free)
         return Doubt(self.edge | other, self.free)
 
     __ror__ = __or__
 
-    def where(self, real: Truth) -> Doubt:
+    def where(self, real: Truth) -> "Doubt":
         """This doubt, cleared where a branch is not real, as a free joint does not matter there."""
         return Doubt(self.edge & real, self.free & real)
 
@@ -124,7 +122,7 @@ class Candidates(NamedTuple):
         known = [c if s is None else angle for (c, s), angle in zip(self.pairs, angles, strict=True)]
         return [arrays.arctan2(s, c) if x is None else x for (c, s), x in zip(self.pairs, known, strict=True)]
 
-    def reversed(self) -> Candidates:
+    def reversed(self) -> "Candidates":
         """The candidates for the reversed chain."""
         return self._replace(pairs=self.pairs[::-1], angles=self.angles[::-1])
 

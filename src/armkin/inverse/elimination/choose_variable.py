@@ -6,8 +6,6 @@ or down above all, the usual roles are singular or all but; these poses have a l
 prepared when the first such pose comes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -121,7 +119,7 @@ def sample_poses(loop: Loop, q: Array) -> tuple[Array, Array]:
     return goal, np.asarray(size[:, -1], np.float64)
 
 
-def _pencil_sequence(loop: Loop, rated: list[_Rating]) -> tuple[Pencil, ...]:
+def _pencil_sequence(loop: Loop, rated: "list[_Rating]") -> tuple[Pencil, ...]:
     """The pencils of all passes, from ratings in their order."""
     first = rated[0].pencil
     alternatives = [rating.pencil for rating in rated[1:] if rating.error < USELESS]

@@ -8,8 +8,6 @@ The product of such an equation over the signs of s and g, over the squares that
 trigonometric polynomial in t of degree 8 at most, whatever branches are real. Between its roots nothing changes.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -35,17 +33,17 @@ class _Rooted:
     def __init__(self, x: Complex, y: Complex, square: Complex) -> None:
         self.x, self.y, self.square = x, y, square
 
-    def __add__(self, other: _Rooted | Complex | float) -> _Rooted:
+    def __add__(self, other: "_Rooted | Complex | float") -> "_Rooted":
         x, y = (other.x, other.y) if isinstance(other, _Rooted) else (other, 0.0)
         return _Rooted(self.x + x, self.y + y, self.square)
 
-    def __mul__(self, other: _Rooted | Complex | float) -> _Rooted:
+    def __mul__(self, other: "_Rooted | Complex | float") -> "_Rooted":
         if not isinstance(other, _Rooted):
             return _Rooted(self.x * other, self.y * other, self.square)
         x = self.x * other.x + self.square * (self.y * other.y)
         return _Rooted(x, self.x * other.y + self.y * other.x, self.square)
 
-    def __sub__(self, other: _Rooted | Complex | float) -> _Rooted:
+    def __sub__(self, other: "_Rooted | Complex | float") -> "_Rooted":
         return self + other * -1.0
 
     def product(self) -> Complex:

@@ -3,8 +3,6 @@
 The operations are those of a batch. Special targets (an edge, a rounded rotation, a far slide) are left to the batch.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import lru_cache
@@ -31,7 +29,7 @@ from armkin.model.units import TURN, radian_or_reach
 
 
 @lru_cache(maxsize=64)
-def short_way(arm: Arm, task: str | None) -> OneTarget | None:
+def short_way(arm: Arm, task: str | None) -> "OneTarget | None":
     """The solver for single targets of an arm and task, prepared at its first use; None without a closed form."""
     if actual_arm(arm) is not arm or solver(arm, task)[1].pairs is None:
         return None
