@@ -36,8 +36,7 @@ class Closest:
         position: (3,) [mm] of the tool there.
         distance: [mm] to the target's position.
         angle: [rad] to what else the target prescribes; 0 where it prescribes nothing else.
-        converged: it is a local minimum: the gradient vanishes along every joint that no limit stops, and no such
-            motion curves down.
+        converged: it is a local minimum: along joints that no limit stops the gradient vanishes and none curves down.
     """
 
     q: Array
@@ -52,8 +51,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
 
     What is minimised is the squared distance plus the squared angle times the square of a quarter of the reach, so that
     a radian weighs as much as a quarter of the reach. Projected Levenberg-Marquardt from some starts (`near`, home and
-    the nearest of many postures within limits); the best local minimum is returned, ties going to the one nearest to
-    `near`.
+    the nearest of many postures within limits); the best local minimum is returned, of equal ones the nearest to `near`.
 
     Args:
         arm: the arm, as `armkin.load` gives it.

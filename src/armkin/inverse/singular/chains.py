@@ -1,7 +1,6 @@
 """Components longer than one polynomial holds: chains of these, each begun where the one before leaves its span.
 
-A component on which the residual grows has two ends, where that passes `SOLUTION`. What lies between is known to be on
-it, and nothing else is.
+A component on which the residual grows has two ends, where that passes `SOLUTION`. What lies between is on it.
 """
 
 from typing import Any, NamedTuple

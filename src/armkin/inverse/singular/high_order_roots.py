@@ -1,8 +1,7 @@
 """Roots of high order: what rounding makes of one, which of those are one branch, and what shows that none is in reach.
 
 Near such a root the residual hardly grows along a curve, and rounding leaves as many candidates as its order. Two are
-one branch if a posture between them solves the target as well: the one half way, or, where the curve bends, the one
-beside it.
+one branch if a posture between them solves the target, too: that half way or, where the curve bends, one beside it.
 """
 
 import numpy as np

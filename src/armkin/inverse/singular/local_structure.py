@@ -375,8 +375,7 @@ def _decide(curve: Structure, rows: Int, side: Side) -> None:
 def members(structure: Structure, rows: Int, way: Array) -> Bool:
     """Which postures, way (m, M, n) [rad, reaches] from those of rows (m,), lie on their components: (m, M).
 
-    As far as the curve is known; one that solves its target lies as close to it as the directions that are not lost
-    let it.
+    As far as the curve is known; one that solves its target lies as close to it as the second singular value lets it.
     """
     t = (way * structure.v[rows, None]).sum(axis=2)  # (m, M)
     span, slack = structure.span[rows], 4.0 * tol.SOLUTION / structure.second[rows]

@@ -1,8 +1,7 @@
 """Postures in which several self-motions meet, replaced by a posture of each of these.
 
 Two or more directions are lost where they meet, and a root there is known to the root of rounding only: it lies on all
-of the self-motions and on none. A long step away on each of them one direction is lost, and the posture is right to
-rounding.
+of the self-motions and on none. A long step away on each of them one direction is lost, and the posture is exact.
 """
 
 from functools import cache
@@ -32,9 +31,8 @@ SPREAD = 5.0  # factor on that curvature in some direction: no surface of soluti
 def separate(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
-    The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of
-    high order, and postures of surfaces. lost: what they lose. Also which of them (K, M) rest: no push takes them
-    along a self-motion.
+    The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of high order,
+    and postures of surfaces. lost: what they lose. Also which (K, M) rest: no push takes them along a self-motion.
     """
     arm, task, target, _ = goals
     k, b = np.nonzero((size[:, 1:] <= tol.SOLUTION) & (lost.nullity[:, 1:] > 1))
@@ -91,8 +89,7 @@ def _curve_tangents(
 
     As far as t along a lost direction v the residual is t^2 / 2 times u . f''(v, v), for all lost left vectors u:
     quadratic forms of v (docs/solution.md). Curves leave along their common zeros; where there is none, it grows all
-    round, and where they are nothing but zero they do not tell. Of three lost directions it is told whether there is
-    none.
+    round, and where they are nothing but zero they do not tell. Three lost directions tell whether there is none.
     """
     n, decided = arm.n, np.zeros(len(q), bool)
     meetings, directions = [np.zeros(0, np.intp)], [np.zeros((0, n))]

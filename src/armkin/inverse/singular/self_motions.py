@@ -27,8 +27,7 @@ def drop_contained(goals: Goals, q: Array, sigma: Array, resting: Bool, chosen: 
     """Keep the one of more joints of self-motions through each other, and no root of high order beside or on one.
 
     Changes chosen (K, M); curve: (K, M, n) the joints that a posture's self-motion moves; resting: (K, M, n) joints
-    that do not move along the one direction that it loses: a curve that moves such a joint is another. `near`, the
-    first, stays.
+    that do not move along the one direction that it loses: a curve that moves one is another. `near`, the first, stays.
     """
     arm, task, target, _ = goals
     pairs: list[tuple[int, int, int]] = []  # a target, a posture of it and one of a self-motion beside

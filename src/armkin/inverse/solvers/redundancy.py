@@ -1,5 +1,4 @@
-"""Arms with one joint more than their task asks for: which joint is redundant, what its motion does to a target; joints
-that are held."""
+"""Arms with a joint more than their task asks for: the redundant joint, its effect on a target; joints that are held."""
 
 from collections.abc import Mapping
 from contextlib import suppress
