@@ -51,7 +51,7 @@ def closest(arm: Arm, target: ArrayLike, task: str | None = None, *, near: Array
 
     What is minimised is the squared distance plus the squared angle times the square of a quarter of the reach, so that
     a radian weighs as much as a quarter of the reach. Projected Levenberg-Marquardt from some starts (`near`, home and
-    the nearest of many postures within limits); the best local minimum is returned, of equal ones the nearest to `near`.
+    the nearest of many postures within limits); the best minimum is returned, of equal ones the nearest to `near`.
 
     Args:
         arm: the arm, as `armkin.load` gives it.

@@ -117,7 +117,7 @@ def share_circuit(arm: Arm, task: Task, q: Array, joints: Bool, postures: Array,
 
     Two postures with the same values of the joints that a self-motion holds need not lie on one: a linkage of four bars
     has two circuits where its shortest bar can go all the way round (Grashof's condition). joints: (M, n) those that
-    move. The curve is walked both ways at once until it closes. Where another crosses it, or it is too long, all are on it.
+    move. The curve is walked both ways at once until it closes. Where another crosses, or it is too long, all are.
     """
     on_circuit = np.ones(compared.shape, bool)
     if task.orientation == "full":

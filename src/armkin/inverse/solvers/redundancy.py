@@ -1,4 +1,4 @@
-"""Arms with a joint more than their task asks for: the redundant joint, its effect on a target; joints that are held."""
+"""Arms with a joint more than their task asks for: the redundant joint, its effect on a target; joints held."""
 
 from collections.abc import Mapping
 from contextlib import suppress
