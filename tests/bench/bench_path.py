@@ -139,7 +139,7 @@ def print_tips(lines: int) -> None:
             assert isinstance(curve, Curve)
             t = np.interp(np.arange(20 * len(curve.times)) / 20, np.arange(len(curve.times)), curve.times)
             p = armkin.fk(arm, curve.evaluate(t))[:, :3, 3]
-            a, b = (split_target(task_for(arm), end).p for end in ends)
+            a, b = (split_target(task_for(arm), end).position for end in ends)
             a, b = (np.append(x, p[0, 2])[:3] if len(x) < 3 else x for x in (a, b))
             d = (b - a) / np.linalg.norm(b - a)
             deviation = float(np.linalg.norm(p - a - ((p - a) @ d)[:, None] * d, axis=1).max())

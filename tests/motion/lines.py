@@ -18,5 +18,5 @@ def random_line(arm: armkin.Arm, rng: np.random.Generator) -> Piece:
     high = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
     q = rng.uniform(low, high)
     a = split_target(task, targets_of(task, armkin.fk(arm, q)[None], q[None])[0])
-    d = rng.normal(size=len(a.p))
-    return line(task, a, Spot(a.p + 300 * d / np.linalg.norm(d), a.sums, a.turned))
+    d = rng.normal(size=len(a.position))
+    return line(task, a, Spot(a.position + 300 * d / np.linalg.norm(d), a.sums, a.orientation))

@@ -73,26 +73,26 @@ def _rounded_way(corners: Array, blend: float) -> Knots:
     length = np.linalg.norm(side, axis=1)
     direction = side / length[:, None]
     cut = np.concatenate([[0.0], np.minimum(blend, np.minimum(length[:-1], length[1:]) / 2), [0.0]])
-    q, d, s = [corners[:1]], [direction[:1]], [np.zeros(1)]
-    f = np.linspace(0.0, 1.0, _NODE_COUNT + 1)[1:, None]
+    q, slopes, s = [corners[:1]], [direction[:1]], [np.zeros(1)]
+    fraction = np.linspace(0.0, 1.0, _NODE_COUNT + 1)[1:, None]
     length_before = 0.0
     for i in range(len(side)):
-        a = corners[i] + cut[i] * direction[i]
+        straight_begin = corners[i] + cut[i] * direction[i]
         straight_length = length[i] - cut[i] - cut[i + 1]
         if straight_length > 1e-9 * length[i]:
-            q.append(a + f * straight_length * direction[i])
-            d.append(np.repeat(direction[i : i + 1], _NODE_COUNT, axis=0))
-            s.append(length_before + f[:, 0] * straight_length)
+            q.append(straight_begin + fraction * straight_length * direction[i])
+            slopes.append(np.repeat(direction[i : i + 1], _NODE_COUNT, axis=0))
+            s.append(length_before + fraction[:, 0] * straight_length)
             length_before += straight_length
         if i + 1 < len(side):  # a parabola whose tangents are the two sides
-            r = cut[i + 1]
-            begin, corner = corners[i + 1] - r * direction[i], corners[i + 1]
-            end = corner + r * direction[i + 1]
-            q.append((1 - f) ** 2 * begin + 2 * f * (1 - f) * corner + f**2 * end)
-            d.append((1 - f) * direction[i] + f * direction[i + 1])
-            s.append(length_before + 2 * r * f[:, 0])
-            length_before += 2 * r
-    return Knots(np.concatenate(s), np.concatenate(q), np.concatenate(d))
+            cut_length = cut[i + 1]
+            begin, corner = corners[i + 1] - cut_length * direction[i], corners[i + 1]
+            end = corner + cut_length * direction[i + 1]
+            q.append((1 - fraction) ** 2 * begin + 2 * fraction * (1 - fraction) * corner + fraction**2 * end)
+            slopes.append((1 - fraction) * direction[i] + fraction * direction[i + 1])
+            s.append(length_before + 2 * cut_length * fraction[:, 0])
+            length_before += 2 * cut_length
+    return Knots(np.concatenate(s), np.concatenate(q), np.concatenate(slopes))
 
 
 def _scale_joints(path: Knots, unit: Array) -> Knots:

@@ -38,21 +38,25 @@ def add_boundary_chains(
     if not last:
         return result
     postures = columns.q[0][columns.valid[0]] if fixed is None else fixed[None]
-    result = _add_new_chains(result, [part for c in chains for part in _chains_from(s, c, 0, postures, tolerance)])
+    result = _add_new_chains(
+        result, [part for chain in chains for part in _chains_from(s, chain, 0, postures, tolerance)]
+    )
     for boundary in _boundary_samples(columns, chains):
         postures = columns.q[boundary][columns.valid[boundary]]
-        arriving = [part for c in result for part in _chains_to(s, c, boundary, postures, tolerance)]
+        arriving = [part for chain in result for part in _chains_to(s, chain, boundary, postures, tolerance)]
         # A chain joined at an earlier boundary continues as one of `chains`, so these are all that leave.
-        leaving = [part for c in chains for part in _chains_from(s, c, boundary, postures, tolerance)]
+        leaving = [part for chain in chains for part in _chains_from(s, chain, boundary, postures, tolerance)]
         new_chains = (_join_chains(a, b) for a, b in product(arriving, leaving) if _are_consecutive(a, b))
         result += islice(new_chains, max(_MAX_CHAINS - len(result), 0))
     postures = columns.q[last][columns.valid[last]]
-    return _add_new_chains(result, [part for c in result for part in _chains_to(s, c, last, postures, tolerance)])
+    return _add_new_chains(
+        result, [part for chain in result for part in _chains_to(s, chain, last, postures, tolerance)]
+    )
 
 
 def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
     """The inner samples on a boundary near which a chain ends; an empty list if there are too many."""
-    ends = np.unique([sample for c in chains for sample in (c.first, c.last)])
+    ends = np.unique([sample for chain in chains for sample in (chain.first, chain.last)])
     inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
     near_ends = [
         row for row in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[row]).min() <= _END_DISTANCE
@@ -62,7 +66,7 @@ def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
 
 def _add_new_chains(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
     """The chains, and those of `new_chains` that are not among them."""
-    return chains + [c for c in new_chains if c not in chains]
+    return chains + [chain for chain in new_chains if chain not in chains]
 
 
 def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain]:

@@ -200,7 +200,7 @@ def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None)
         runs.append(_least_motion_run(choices, i, last))
         if last >= N - 1:
             break
-        i = last if any(c.carries_to(last) > last for c in chains) else last + 1
+        i = last if any(chain.carries_to(last) > last for chain in chains) else last + 1
     return runs
 
 

@@ -33,9 +33,9 @@ def levers(arm: Arm) -> Array:
     return np.asarray(bounds * np.outer(arm.ratio, arm.ratio))
 
 
-def chord_bound(lever: Array, D: Array) -> Array:
-    """How far the tip may leave its chord on straight joint steps D (..., n): (...) [mm]."""
-    size = np.abs(D)
+def chord_bound(lever: Array, change: Array) -> Array:
+    """How far the tip may leave its chord on straight joint steps (..., n): (...) [mm]."""
+    size = np.abs(change)
     return np.asarray(0.125 * np.einsum("...i,...i->...", size @ lever, size))
 
 

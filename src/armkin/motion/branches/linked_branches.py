@@ -128,9 +128,9 @@ class _Linking:
         is wanted, to END_ACCURACY.
         """
         columns = self.columns
-        h = np.diff(columns.s)
+        step_lengths = np.diff(columns.s)
         min_step = np.where(self.both, max(MIN_STEP * self.length, 1e-9), END_ACCURACY)
-        steps = np.flatnonzero((self.torn | self.crossing) & (h > 1.5 * min_step))
+        steps = np.flatnonzero((self.torn | self.crossing) & (step_lengths > 1.5 * min_step))
         # Steps that only hold an end go first, by the formulas alone: singular samples are expensive to examine.
         singular = columns.status == Status.SINGULAR
         is_plain = ~(self.both | singular[:-1] | singular[1:])[steps]
@@ -140,7 +140,7 @@ class _Linking:
             return False
         parts = int(np.clip(_CHUNK_SAMPLES // len(steps), *_PART_COUNTS))
         fractions = np.arange(1, parts) / parts
-        lengths = (columns.s[steps, None] + h[steps, None] * fractions).ravel()
+        lengths = (columns.s[steps, None] + step_lengths[steps, None] * fractions).ravel()
         added_columns = self.samples.solve_at(lengths, examine=not skip_singular)
         self.where = rows = np.repeat(steps + 1, parts - 1)
         self.fresh = np.insert(self.fresh, rows, True)

@@ -45,8 +45,8 @@ def _newton(arm: Arm, task: Task, q: Array, target: Array, damping: float, steps
     for _ in range(steps):
         q = joints[active]
         T, J = _pose_and_jacobian(arm, task, q)
-        r = _residuals(arm, task, T, q, target[active])
-        step = _damped_steps(J, r, (damping / arm.reach) ** 2)
+        residuals = _residuals(arm, task, T, q, target[active])
+        step = _damped_steps(J, residuals, (damping / arm.reach) ** 2)
         size = np.abs(step).max(axis=0)
         step *= np.where(size > 0.05, 0.05 / np.maximum(size, 1e-300), 1.0)
         joints[active] = q + step.T * unit
@@ -67,9 +67,9 @@ def _row_scale(arm: Arm, task: Task) -> Array:
 
 def _pose_and_jacobian(arm: Arm, task: Task, q: Array) -> tuple[Array, Array]:
     """The tool's poses (M, 4, 4), and the task's Jacobians without units, column by column: (n, k, M)."""
-    k, p, scale = len(task.sums), task.position, _row_scale(arm, task)
+    sum_count, position_size, scale = len(task.sums), task.position, _row_scale(arm, task)
     factor = radian_or_reach(arm)[:, None, None] * scale[:, None]  # (n, k, 1)
-    factor[:, p : p + k] *= arm.ratio[:, None, None]
+    factor[:, position_size : position_size + sum_count] *= arm.ratio[:, None, None]
     T, J = tip_and_jacobian(arm, q)
     return T, np.multiply(task_jacobian(task, J, T).transpose(2, 1, 0), factor, order="C")
 
@@ -79,13 +79,13 @@ def _residuals(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array
     return np.multiply(residual(task, T, q * arm.ratio, target).T, _row_scale(arm, task)[:, None], order="C")
 
 
-def _damped_steps(J: Array, r: Array, damping: float) -> Array:
+def _damped_steps(J: Array, residuals: Array, damping: float) -> Array:
     """Solutions x (n, M) of (J'J + damping 1) x = J'r: column by column J (n, k, M), and r (k, M), by Cholesky.
 
     Over all members at once it takes a fraction of the time of `np.linalg.solve` on small matrices.
     """
     n = len(J)
-    x = (J * r).sum(axis=1)
+    x = (J * residuals).sum(axis=1)
     L: list[list[Array]] = []
     for i in range(n):
         L.append([])

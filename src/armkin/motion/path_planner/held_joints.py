@@ -80,10 +80,14 @@ def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> 
         plan,
         arm=arm,
         held=dict(held),
-        runs=[replace(r, start_joints=unlocked(r.start_joints), end_joints=unlocked(r.end_joints)) for r in plan.runs],
-        branches=[replace(b, start_joints=unlocked(b.start_joints)) for b in plan.branches],
+        runs=[
+            replace(run, start_joints=unlocked(run.start_joints), end_joints=unlocked(run.end_joints))
+            for run in plan.runs
+        ],
+        branches=[replace(branch, start_joints=unlocked(branch.start_joints)) for branch in plan.branches],
         reconfigurations=[
-            replace(r, index=None if r.joint is None else arm.joint_names.index(r.joint)) for r in plan.reconfigurations
+            replace(change, index=None if change.joint is None else arm.joint_names.index(change.joint))
+            for change in plan.reconfigurations
         ],
         nearest_singularity=None if singularity is None else (*singularity[:2], unlocked(singularity[2])),
         markers=[],

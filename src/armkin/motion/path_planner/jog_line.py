@@ -84,10 +84,10 @@ def _steps_carried(
     last_slowness, near_singularity = np.inf, False  # an arm that starts near a singularity may move away from it
     for step_number in range(1, max_steps + 1):
         goal = _shift_target(arm, task, q, axis, frame, step * step_number)[None]
-        r, J = scaled(arm, task, posture[None], goal)
-        change = np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0]
+        residual, J = scaled(arm, task, posture[None], goal)
+        change = np.linalg.lstsq(J[0], residual[0], rcond=1e-9)[0]
         # no joint motion moves the tip this way
-        blocked = np.linalg.norm(J[0] @ change - r[0]) > 0.1 * np.linalg.norm(r[0])
+        blocked = np.linalg.norm(J[0] @ change - residual[0]) > 0.1 * np.linalg.norm(residual[0])
         joint_step = change * unit
         slowness = float(np.max(np.abs(joint_step) / arm.max_speed)) * SLOW_SHARE * top_speed / abs(step)
         if blocked or (slowness > 1.0 and slowness >= last_slowness):
@@ -95,8 +95,8 @@ def _steps_carried(
         last_slowness, near_singularity = slowness, slowness > 1.0
         posture = posture + joint_step
         for _ in range(3):
-            r, J = scaled(arm, task, posture[None], goal)
-            posture = posture + np.linalg.lstsq(J[0], r[0], rcond=1e-9)[0] * unit
+            residual, J = scaled(arm, task, posture[None], goal)
+            posture = posture + np.linalg.lstsq(J[0], residual[0], rcond=1e-9)[0] * unit
         if not float(np.abs(scaled(arm, task, posture[None], goal)[0]).max()) < 1e-7:
             return step_number - 1, "it is out of reach" if step_number > 1 else "a singularity is near"
         if stop_text := _stop_reason(arm, posture, starts_in_hit):

@@ -89,15 +89,17 @@ def _add_offset(walk: Walk, move: Move, value: Any) -> None:
     displacement = path_numbers.coordinates(walk.task, value.xyz)
     if value.frame == "tool":
         if walk.task.orientation == "full":
-            assert walk.spot.turned is not None
-            displacement = walk.spot.turned @ displacement
+            assert walk.spot.orientation is not None
+            displacement = walk.spot.orientation @ displacement
         else:  # the tool's axes depend on the joints, so a posture has to be chosen first
             typed_sums = walk.spot.sums
             walk.take_posture()
             walk.begin_group(None)
             walk.keep_typed_turns(typed_sums)
             displacement = (fk(walk.arm, walk.q)[:3, :3] @ np.append(displacement, 0.0)[:3])[: len(displacement)]
-    walk.add_piece(move, piece_shapes.line(walk.task, walk.spot, replace(walk.spot, p=walk.spot.p + displacement)))
+    walk.add_piece(
+        move, piece_shapes.line(walk.task, walk.spot, replace(walk.spot, position=walk.spot.position + displacement))
+    )
 
 
 def _queue_wait(walk: Walk, move: Move, value: float) -> None:

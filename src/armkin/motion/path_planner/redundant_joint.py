@@ -180,9 +180,9 @@ def _count_lacking(
     conditions = [legal]
     if margins:
         q = np.insert(ik_answers.q, extra.joint, joint_angles[:, None], axis=2)
-        mm = np.full(legal.shape, -np.inf)
-        mm[legal] = clearance(arm, q[legal]).mm
-        conditions += [mm >= margin for margin in margins]
+        clearances = np.full(legal.shape, -np.inf)
+        clearances[legal] = clearance(arm, q[legal]).mm
+        conditions += [clearances >= margin for margin in margins]
     counts = []
     for allowed in conditions:
         has_branch = allowed.any(axis=1, keepdims=True)

@@ -35,7 +35,7 @@ def target_postures(arm: Arm, task: Task, goal: Spot, near: Array, branch: str |
 
 def _no_posture(solutions: Solutions, goal: Spot, branch_name: str | None, clear: Bool | None) -> NoSolutionError:
     """The error of a target without a posture: out of reach, or every branch (of that name) hits or breaks a limit."""
-    point = f"the point {', '.join(f'{x:g}' for x in goal.p.round(3).tolist())}"
+    point = f"the point {', '.join(f'{x:g}' for x in goal.position.round(3).tolist())}"
     if solutions.status == Status.UNREACHABLE:
         return NoSolutionError(f"{point} is out of reach: nothing was moved")
     on_branch = f" on branch '{branch_name}'" if branch_name else ""

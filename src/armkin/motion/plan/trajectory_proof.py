@@ -142,8 +142,8 @@ def prove_plan(plan: PathPlan) -> PathPlan:
     if proof is None:
         return plan
     s = float(plan.s(hit_time(plan.motion, proof)))
-    mm = proof.mm if np.isfinite(proof.mm) else None
-    plan.clearance = {"mm": mm, "s_mm": s, "body": proof.body, "with": proof.keep_out}
+    least_clearance = proof.mm if np.isfinite(proof.mm) else None
+    plan.clearance = {"mm": least_clearance, "s_mm": s, "body": proof.body, "with": proof.keep_out}
     if proof.free or plan.arm.ignores_keep_out:
         if plan.approach is not None:
             check_free(plan.approach, " on the way to the path's start")

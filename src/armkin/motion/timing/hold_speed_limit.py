@@ -42,14 +42,14 @@ def _part_cap(arm: Arm, path: Knots, share: float) -> Array:
     ends = path.second_derivatives()
     caps = np.full(len(path.s), np.inf)
     rate = path.d @ gain.T
-    m = (np.abs(rate) / brakes).argmax(axis=1)
-    lead = rate[np.arange(len(m)), m]
+    leader = (np.abs(rate) / brakes).argmax(axis=1)
+    lead = rate[np.arange(len(leader)), leader]
     lead = np.where(np.abs(lead) < TINY, TINY, lead)
     ratio = path.d / lead[:, None]  # q'_j / n'_m
-    slowing = -ratio * np.sign(lead)[:, None] * brakes[m][:, None]
+    slowing = -ratio * np.sign(lead)[:, None] * brakes[leader][:, None]
     max_accel = share * arm.max_accel
     for second, part in ((ends[0], slice(None, -1)), (ends[1], slice(1, None))):
-        turned = (second * gain[m[part]]).sum(axis=1)
+        turned = (second * gain[leader[part]]).sum(axis=1)
         bend = second - ratio[part] * turned[:, None]
         margin = max_accel - np.sign(bend) * slowing[part]
         interval_cap = np.maximum(margin, 0.0) / np.maximum(np.abs(bend), TINY)

@@ -35,11 +35,11 @@ class Least(NamedTuple):
         np.minimum.at(lowest, self.interval, self.slope * y[self.interval] + self.level)
         return lowest
 
-    def part(self, lo: int, hi: int) -> Least:
+    def part(self, begin: int, end: int) -> Least:
         """The least functions of intervals lo to hi."""
-        first, last = np.searchsorted(self.interval, [lo, hi])
-        a0, b0, a1, b1 = (values[lo:hi] for values in (self.a0, self.b0, self.a1, self.b1))
-        return Least(a0, b0, a1, b1, self.interval[first:last] - lo, self.slope[first:last], self.level[first:last])
+        first, last = np.searchsorted(self.interval, [begin, end])
+        a0, b0, a1, b1 = (values[begin:end] for values in (self.a0, self.b0, self.a1, self.b1))
+        return Least(a0, b0, a1, b1, self.interval[first:last] - begin, self.slope[first:last], self.level[first:last])
 
     def replace_intervals(self, intervals: Int, functions: Least) -> Least:
         """The least functions with others in some intervals (k,), ascending; a0 to b1 change in place."""

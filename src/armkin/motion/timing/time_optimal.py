@@ -53,11 +53,11 @@ def knots_of_samples(s: Array, q: Array, breaks: Sequence[int] = (), rests: Sequ
     if len(rests) or (len(edges) > _MIN_SECTIONS and np.diff(edges).min() >= _SLOPE_SAMPLES - 1):
         return _knots_in_sections(s, q, edges, np.isin(edges[1:-1], rests))
     total, count = np.zeros_like(q), np.zeros(N)
-    for lo, hi in pairwise(edges.tolist()):
-        for part in interval_parts(hi + 1 - lo):
-            i = np.arange(lo + part.start, lo + part.stop)
-            total[i] += _slopes_at(s, q, i, np.full(len(i), lo), np.full(len(i), hi))
-        count[lo : hi + 1] += 1
+    for first, last in pairwise(edges.tolist()):
+        for part in interval_parts(last + 1 - first):
+            samples = np.arange(first + part.start, first + part.stop)
+            total[samples] += _slopes_at(s, q, samples, np.full(len(samples), first), np.full(len(samples), last))
+        count[first : last + 1] += 1
     total /= count[:, None]
     return Knots(s, q, total)
 

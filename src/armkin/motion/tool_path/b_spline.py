@@ -90,11 +90,11 @@ def least_squares(layout: Layout, y: Array, weight: Array, ends: Bool) -> Array:
     bands = np.zeros((4, layout.count))
     right = np.zeros((layout.count, y.shape[1]))
     for j in range(4):
-        wj, rows = w * N[j], first + j
+        weighted, rows = w * N[j], first + j
         for k in range(j, 4):
-            bands[k - j] += np.bincount(rows, wj * N[k], layout.count)
-        for d, column in enumerate(columns):
-            right[:, d] += np.bincount(rows, wj * column, layout.count)
+            bands[k - j] += np.bincount(rows, weighted * N[k], layout.count)
+        for coordinate, column in enumerate(columns):
+            right[:, coordinate] += np.bincount(rows, weighted * column, layout.count)
     _add_ridge(layout, bands)
     return solve_banded(bands, right)
 

@@ -28,7 +28,7 @@ def blend(task: Task, a: Piece, b: Piece, radius: float, side: float) -> Blend:
     side: the first piece's length before the blend at its other end. The radius is `radius`, or less to leave half of
     each side.
     """
-    corner, half_side = b.first.p, max(a.length - side / 2, 0.0)
+    corner, half_side = b.first.position, max(a.length - side / 2, 0.0)
     radius = min(radius, *(_distance_from(piece, corner, s) for piece, s in ((a, half_side), (b, b.length / 2))))
     cut_a = _length_at_radius(a, corner, radius, a.length, half_side)
     cut_b = _length_at_radius(b, corner, radius, 0.0, b.length / 2)

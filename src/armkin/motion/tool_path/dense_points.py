@@ -59,14 +59,14 @@ class Polyline:
         """The last target."""
         number, spot = self._last
         if number < len(self.rows):  # later rows give the position alone
-            self._last = len(self.rows), replace(spot, p=np.array(self.rows[-1], dtype=float))
+            self._last = len(self.rows), replace(spot, position=np.array(self.rows[-1], dtype=float))
         return self._last[1]
 
     def pieces(self, tolerance: float) -> list[Piece]:
         """Smooth curves through all targets, divided where the path turns back."""
         spots = _Spots.from_rows(self.task, self.first, self.rows)
         speeds = np.array(self.speeds)
-        y = spots.relative_values(0, len(spots.p) - 1)
+        y = spots.relative_values(0, len(spots.positions) - 1)
         if y is None:  # the tool turns too far for one curve: straight lines
             return self._lines(spots, speeds)
         y = y * weights(self.task)
@@ -75,7 +75,7 @@ class Polyline:
             return self._lines(spots, speeds)
         back = 1 + np.flatnonzero(turn_angles(y[distinct]) > REVERSAL_ANGLE) if len(distinct) > 2 else np.zeros(0, int)
         ends = np.concatenate([[0], back, [len(distinct) - 1]])
-        turns = bool(y[:, len(spots.p[0]) + spots.sums.shape[1] :].any())
+        turns = bool(y[:, len(spots.positions[0]) + spots.sums.shape[1] :].any())
         pieces: list[Piece] = []
         for block in _point_blocks(ends, 1 if turns else _BLOCK_POINTS):
             numbers, first = distinct[block[0] : block[-1] + 1], int(distinct[block[0]])
@@ -99,51 +99,57 @@ class _Spots:
     """Spots as arrays."""
 
     task: Task
-    p: Array  # (N, 2 or 3)
+    positions: Array  # (N, 2 or 3)
     sums: Array  # (N, k)
-    turned: Array | None  # (N, 3, 3), (N, 3) or nothing
+    orientations: Array | None  # (N, 3, 3), (N, 3) or nothing
 
     @staticmethod
     def from_rows(task: Task, first: Spot, rows: list[Sequence[float]]) -> _Spots:
         """The first spot and rows of numbers from the file; a row of a position keeps the orientation before it."""
         labels, N = task.labels, len(rows) + 1
-        full = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
-        p = np.array([first.p, *((row[: task.position] for row in rows) if len(full) else rows)], dtype=float)
-        last_full = np.searchsorted(full, np.arange(N), side="right")  # 0: the first spot
-        targets = targets_in(labels, [list(rows[k - 1]) for k in full]) if len(full) else None
+        full_rows = np.flatnonzero([False, *(len(row) > task.position for row in rows)])
+        positions = np.array(
+            [first.position, *((row[: task.position] for row in rows) if len(full_rows) else rows)], dtype=float
+        )
+        last_full = np.searchsorted(full_rows, np.arange(N), side="right")  # 0: the first spot
+        targets = targets_in(labels, [list(rows[k - 1]) for k in full_rows]) if len(full_rows) else None
         k = len(task.sums)
-        sums = np.zeros((len(full), k)) if targets is None or not k else targets[:, task.position : task.position + k]
-        turned = None
-        if first.turned is not None:
-            parts = [first.turned[None]]
+        sums = (
+            np.zeros((len(full_rows), k)) if targets is None or not k else targets[:, task.position : task.position + k]
+        )
+        orientations = None
+        if first.orientation is not None:
+            parts = [first.orientation[None]]
             if targets is not None and task.orientation == "full":
                 parts.append(targets[:, :3, :3])
             elif targets is not None:
                 axis = targets[:, task.position + k : task.position + k + 3]
                 parts.append(axis / np.linalg.norm(axis, axis=1, keepdims=True))
-            turned = np.concatenate(parts)[last_full]
-        return _Spots(task, p, np.concatenate([first.sums[None], sums])[last_full], turned)
+            orientations = np.concatenate(parts)[last_full]
+        return _Spots(task, positions, np.concatenate([first.sums[None], sums])[last_full], orientations)
 
     def spot(self, k: int) -> Spot:
         """The spot of point k."""
-        return Spot(self.p[k], self.sums[k], None if self.turned is None else self.turned[k])
+        return Spot(self.positions[k], self.sums[k], None if self.orientations is None else self.orientations[k])
 
     def relative_values(self, a: int, b: int) -> Array | None:
         """Spots a to b as values y of a piece that starts at a, (b - a + 1, d); None: the tool turns too far."""
-        w = np.zeros((b - a + 1, 3))
-        if self.turned is not None and (self.turned[a : b + 1] != self.turned[a]).any():
+        rotations = np.zeros((b - a + 1, 3))
+        if self.orientations is not None and (self.orientations[a : b + 1] != self.orientations[a]).any():
             if self.task.orientation == "full":
-                w = rotation_vectors(self.turned[a : b + 1] @ self.turned[a].T)
-                for k in np.flatnonzero(np.linalg.norm(w, axis=1) > 0.5 * np.pi).tolist():
-                    size = np.linalg.norm(w[k])
-                    opposite = w[k] * (1 - 2 * np.pi / size)  # the same rotation the other way round
-                    if k and np.linalg.norm(opposite - w[k - 1]) < np.linalg.norm(w[k] - w[k - 1]):
-                        w[k] = opposite
+                rotations = rotation_vectors(self.orientations[a : b + 1] @ self.orientations[a].T)
+                for k in np.flatnonzero(np.linalg.norm(rotations, axis=1) > 0.5 * np.pi).tolist():
+                    size = np.linalg.norm(rotations[k])
+                    opposite = rotations[k] * (1 - 2 * np.pi / size)  # the same rotation the other way round
+                    if k and np.linalg.norm(opposite - rotations[k - 1]) < np.linalg.norm(
+                        rotations[k] - rotations[k - 1]
+                    ):
+                        rotations[k] = opposite
             else:
-                w = np.array([turn_between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
-            if np.linalg.norm(w, axis=1).max() > _FARTHEST_TURN:
+                rotations = np.array([turn_between(self.task, self.spot(a), self.spot(k)) for k in range(a, b + 1)])
+            if np.linalg.norm(rotations, axis=1).max() > _FARTHEST_TURN:
                 return None
-        return np.concatenate([self.p[a : b + 1], self.sums[a : b + 1], w], axis=1)
+        return np.concatenate([self.positions[a : b + 1], self.sums[a : b + 1], rotations], axis=1)
 
 
 def _point_blocks(ends: Int, points: int) -> list[Int]:
@@ -177,17 +183,19 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
             continue
         begins = a + np.flatnonzero(np.append(True, changes[a + 1 : b]))
         low, high = passed[a], passed[b]
-        (i, j), (k, m) = (np.searchsorted(x, [low - 1e-12, high + 1e-12]).tolist() for x in (bends, spans))
+        block_ends = [low - 1e-12, high + 1e-12]
+        first_bend, last_bend = np.searchsorted(bends, block_ends).tolist()
+        first_span, last_span = np.searchsorted(spans, block_ends).tolist()
         dense = Dense(
             given=passed[a : b + 1] - low,
-            points=spots.p[numbers[a : b + 1]],
-            bends=bends[i:j] - low,
-            spans=spans[k:m] - low,
+            points=spots.positions[numbers[a : b + 1]],
+            bends=bends[first_bend:last_bend] - low,
+            spans=spans[first_span:last_span] - low,
             begins=passed[begins] - low,
             speed=speeds[begins, 0],
             tool_speed=speeds[begins, 1],
         )
-        first = replace(piece.first, p=spots.p[numbers[a]], sums=spots.sums[numbers[a]])
+        first = replace(piece.first, position=spots.positions[numbers[a]], sums=spots.sums[numbers[a]])
         pieces.append(Piece(task, first, partial(_curve_from, piece.curve, low), high - low, dense=dense))
     return pieces
 

@@ -182,10 +182,10 @@ def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     i = np.searchsorted(layout.begin, u, side="right") - 1
     h = ((u - layout.begin[i]) / (layout.end[i] - layout.begin[i]))[:, None]
     c0, c1, c2, c3 = (cubics[:, j][i] for j in range(4))
-    p = c0 + h * (c1 + h * (c2 + h * c3))
+    ends = c0 + h * (c1 + h * (c2 + h * c3))
     k = np.clip(np.searchsorted(chords.u, u, side="right") - 1, 0, len(chords.length) - 1)
     unit = chords.step[k] / chords.length[k][:, None]
-    offsets = p - chords.y[k]
+    offsets = ends - chords.y[k]
     projections = np.clip((offsets * unit).sum(axis=1), 0.0, chords.length[k])
     distances = np.linalg.norm(offsets - projections[:, None] * unit, axis=1)
     return np.unique(k[distances > tolerance + chords.sagitta[k]])
@@ -202,13 +202,13 @@ def _round_corners(chords: Chords, stop: Bool, cubics: _Cubics, tolerance: float
     )
     if not len(corner):
         return curves
-    r, blends = _blend_corners(curves, chords, corner, stop[corner], tolerance)
+    radius, blends = _blend_corners(curves, chords, corner, stop[corner], tolerance)
     # curve i lies between corners i - 1 and i and is trimmed to low .. high
-    low, high = np.append(u[0], u[corner] + r), np.append(u[corner] - r, u[-1])
+    low, high = np.append(u[0], u[corner] + radius), np.append(u[corner] - radius, u[-1])
     curve = chords.curve[cubics.chord(chords)]
     parts = _trim_cubics(cubics, low[curve], high[curve])
     rounded = ~stop[corner]
-    blend_begin, blend_end = (u[corner] - r)[rounded], (u[corner] + r)[rounded]
+    blend_begin, blend_end = (u[corner] - radius)[rounded], (u[corner] + radius)[rounded]
     starts = np.append(parts.begin, blend_begin)
     order = np.argsort(starts, kind="stable")
     return FittedCurves(
@@ -228,16 +228,18 @@ def _blend_corners(
     offset = 1e-9 * max_radius
     slope_before, slope_after = (curves.values(u + shift)[1] for shift in (-offset, offset))
     bend = np.linalg.norm(slope_before - slope_after, axis=1)
-    r = np.minimum(max_radius, 4 * tolerance / np.maximum(bend, 1e-12))
+    radius = np.minimum(max_radius, 4 * tolerance / np.maximum(bend, 1e-12))
     for _ in range(20):
-        (a, da), (b, db) = curves.values(u - r), curves.values(u + r)
-        size = 2 * r[:, None]
-        middle = (a + b) / 2 + size * (da - db) / 8
+        (a, slope_a), (b, slope_b) = curves.values(u - radius), curves.values(u + radius)
+        size = 2 * radius[:, None]
+        middle = (a + b) / 2 + size * (slope_a - slope_b) / 8
         distances = np.linalg.norm(middle - chords.y[corner], axis=1)
         if (distances <= tolerance).all():
             break
-        r = np.where(distances > tolerance, 0.9 * r * tolerance / np.maximum(distances, 1e-12), r)
-    return r, np.stack([a, size * da, 3 * (b - a) - size * (2 * da + db), 2 * (a - b) + size * (da + db)], axis=1)
+        radius = np.where(distances > tolerance, 0.9 * radius * tolerance / np.maximum(distances, 1e-12), radius)
+    square = 3 * (b - a) - size * (2 * slope_a + slope_b)
+    cube = 2 * (a - b) + size * (slope_a + slope_b)
+    return radius, np.stack([a, size * slope_a, square, cube], axis=1)
 
 
 def _trim_cubics(cubics: _Cubics, low: Array, high: Array) -> _Cubics:

@@ -77,7 +77,7 @@ def target_spot(task: Task, last_spot: Spot, value: Sequence[float]) -> Spot:
     """The spot of a target's numbers; a position alone keeps the last sums and orientation."""
     labels = task.labels
     if len(value) == task.position < len(labels):
-        return replace(last_spot, p=np.asarray(value, dtype=float))
+        return replace(last_spot, position=np.asarray(value, dtype=float))
     if len(value) != len(labels):
         alternative = f", or {' '.join(labels[: task.position])} alone" if len(labels) > task.position else ""
         raise UsageError(f"a target of task {task.name} is {' '.join(labels)}{alternative}; got {len(value)} numbers")

@@ -51,9 +51,9 @@ def rotation_vectors(R: Array) -> Array:
 class Spot:
     """The parts of a target: position, sums of angles, and an orientation (3, 3), a direction (3,) or None."""
 
-    p: Array
+    position: Array
     sums: Array
-    turned: Array | None
+    orientation: Array | None
 
 
 def split_target(task: Task, target: ArrayLike) -> Spot:
@@ -61,23 +61,27 @@ def split_target(task: Task, target: ArrayLike) -> Spot:
     values = np.asarray(target, dtype=float)
     if task.orientation == "full":
         return Spot(values[:3, 3], np.zeros(0), values[:3, :3])
-    p, angles = values[: task.position], values[task.position :]
-    k = len(task.sums)
-    axis = angles[k : k + 3] / np.linalg.norm(angles[k : k + 3]) if task.orientation == "axis" else None
-    return Spot(p, angles[:k], axis)
+    position, angles = values[: task.position], values[task.position :]
+    sum_count = len(task.sums)
+    axis = (
+        angles[sum_count : sum_count + 3] / np.linalg.norm(angles[sum_count : sum_count + 3])
+        if task.orientation == "axis"
+        else None
+    )
+    return Spot(position, angles[:sum_count], axis)
 
 
 def turn_between(task: Task, a: Spot, b: Spot) -> Array:
     """Rotation vector from one orientation to another."""
-    if a.turned is None or b.turned is None:
+    if a.orientation is None or b.orientation is None:
         return np.zeros(3)
     if task.orientation == "full":
-        return rotation_vectors(b.turned @ a.turned.T)
-    normal = np.cross(a.turned, b.turned)
+        return rotation_vectors(b.orientation @ a.orientation.T)
+    normal = np.cross(a.orientation, b.orientation)
     sine = float(np.linalg.norm(normal))
-    if sine < 1e-12 and a.turned @ b.turned < 0:
+    if sine < 1e-12 and a.orientation @ b.orientation < 0:
         raise UsageError("a move turns the tool's axis over, by half a turn: put a point in between")
-    return np.asarray(normal * (math.atan2(sine, float(a.turned @ b.turned)) / max(sine, 1e-300)))
+    return np.asarray(normal * (math.atan2(sine, float(a.orientation @ b.orientation)) / max(sine, 1e-300)))
 
 
 @dataclass(frozen=True)
@@ -122,14 +126,14 @@ class Piece:
         """Targets (N, m) or (N, 4, 4) at lengths s (N,)."""
         y = self.curve(np.clip(s, 0.0, self.length))
         n, k = self.task.position, len(self.task.sums)
-        if self.first.turned is None:
+        if self.first.orientation is None:
             return y[:, : n + k]
         w = y[:, n + k :]
         R = rotation_matrices(w) if w.any() else np.broadcast_to(np.eye(3), (len(y), 3, 3))
         if self.task.orientation == "axis":
-            return np.concatenate([y[:, : n + k], R @ self.first.turned], axis=1)
+            return np.concatenate([y[:, : n + k], R @ self.first.orientation], axis=1)
         T = np.zeros((len(y), 4, 4))
-        T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = R @ self.first.turned, y[:, :3], 1.0
+        T[:, :3, :3], T[:, :3, 3], T[:, 3, 3] = R @ self.first.orientation, y[:, :3], 1.0
         return T
 
     @cached_property
@@ -143,7 +147,7 @@ class Piece:
         a, b = max(s - h, 0.0), min(s + h, self.length)
         start, end = (split_target(self.task, t) for t in self.targets(np.array([a, b])))
         w = turn_between(self.task, start, end)
-        change = np.concatenate([end.p - start.p, PER_RADIAN * (end.sums - start.sums), PER_RADIAN * w])
+        change = np.concatenate([end.position - start.position, PER_RADIAN * (end.sums - start.sums), PER_RADIAN * w])
         return np.asarray(change / (b - a))
 
     def part(self, a: float, b: float) -> Piece:
@@ -154,7 +158,7 @@ class Piece:
 
         def curve(s: Array) -> Array:
             y = self.curve(s + a)
-            if self.first.turned is None:
+            if self.first.orientation is None:
                 return y
             w = rotation_vectors(rotation_matrices(y[:, n:]) @ rotation.T)
             return np.concatenate([y[:, :n], w], axis=1)
@@ -223,7 +227,7 @@ def divide_spans(u: Array, parts: NDArray[np.intp] | int) -> Array:
 
 def relative_values(task: Task, a: Spot, b: Spot) -> Array:
     """Spot b as values y of a piece that starts at spot a."""
-    return np.concatenate([b.p, b.sums, turn_between(task, a, b)])
+    return np.concatenate([b.position, b.sums, turn_between(task, a, b)])
 
 
 def weights(task: Task) -> Array:

@@ -28,46 +28,46 @@ from armkin.motion.tool_path.path_pieces import (
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
     """A straight line; orientation by slerp, sums linearly."""
-    size = float(np.linalg.norm(b.p - a.p))
-    piece = _uniform_piece(task, a, b, lambda f: a.p + f[:, None] * (b.p - a.p), size)
+    size = float(np.linalg.norm(b.position - a.position))
+    piece = _uniform_piece(task, a, b, lambda f: a.position + f[:, None] * (b.position - a.position), size)
     return replace(piece, rate=size / piece.length) if piece.length > 0 else piece
 
 
 def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:
     """An arc or a helix from `a` about `centre`, by `angle` [rad], rising by `rise` [mm] along the normal in all."""
     n = normal / np.linalg.norm(normal)
-    radial = a.p - centre
-    radial = radial - n * (n @ radial) if len(a.p) == 3 else radial
+    radial = a.position - centre
+    radial = radial - n * (n @ radial) if len(a.position) == 3 else radial
     radius = float(np.linalg.norm(radial))
     if radius < 1e-6:
         raise UsageError("the circle's centre lies on the point where the circle starts: it has no radius")
-    tangent = np.cross(n, radial) if len(a.p) == 3 else np.array([-radial[1], radial[0]]) * n[-1]
-    base = a.p - radial
+    tangent = np.cross(n, radial) if len(a.position) == 3 else np.array([-radial[1], radial[0]]) * n[-1]
+    base = a.position - radial
 
     def position(f: Array) -> Array:
-        t = (f * angle)[:, None]
-        point = base + np.cos(t) * radial + np.sin(t) * tangent
-        return np.asarray(point + f[:, None] * rise * n if len(a.p) == 3 else point)
+        angles = (f * angle)[:, None]
+        point = base + np.cos(angles) * radial + np.sin(angles) * tangent
+        return np.asarray(point + f[:, None] * rise * n if len(a.position) == 3 else point)
 
     length = math.hypot(radius * angle, rise)
-    b = end or Spot(position(np.ones(1))[0], a.sums, a.turned)
-    return _uniform_piece(task, a, b, position, length)
+    end_spot = end or Spot(position(np.ones(1))[0], a.sums, a.orientation)
+    return _uniform_piece(task, a, end_spot, position, length)
 
 
 def arc(task: Task, a: Spot, via: Array, b: Spot) -> Piece:
     """The arc of a circle from `a` through `via` to `b`. Raises UsageError if they are on one line."""
-    p, q, r = (np.append(x, 0.0)[:3] for x in (a.p, via, b.p))
-    u, v = q - p, r - p
+    start, middle, stop = (np.append(x, 0.0)[:3] for x in (a.position, via, b.position))
+    u, v = middle - start, stop - start
     n = np.cross(u, v)
     area = float(n @ n)
     if area < (1e-9 * float(np.linalg.norm(u) + 1) * float(np.linalg.norm(v) + 1)) ** 2 or area < 1e-12:
         raise UsageError("the arc's start, via and to lie on one line, or two of them are the same: use line")
-    centre = p + (np.cross(n, u) * (v @ v) + np.cross(v, n) * (u @ u)) / (2 * area)
-    x, y = p - centre, r - centre
+    centre = start + (np.cross(n, u) * (v @ v) + np.cross(v, n) * (u @ u)) / (2 * area)
+    x, y = start - centre, stop - centre
     unit = n / math.sqrt(area)
     angle = math.atan2(float(unit @ np.cross(x, y)), float(x @ y)) % (2 * math.pi)
-    normal = unit if len(a.p) == 3 else unit[2:]
-    return circle(task, a, centre[: len(a.p)], normal, angle, 0.0, b)
+    normal = unit if len(a.position) == 3 else unit[2:]
+    return circle(task, a, centre[: len(a.position)], normal, angle, 0.0, b)
 
 
 def spline(task: Task, a: Spot, points: Sequence[Spot]) -> Piece:

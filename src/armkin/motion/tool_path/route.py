@@ -77,7 +77,7 @@ class Route:
     @cached_property
     def breaks(self) -> Array:
         """The sorted lengths [mm] where the curvature may jump: ends of pieces, and bends inside dense ones."""
-        bends = [self.ends[k] + p.dense.bends for k, p in enumerate(self.pieces) if p.dense is not None]
+        bends = [self.ends[k] + piece.dense.bends for k, piece in enumerate(self.pieces) if piece.dense is not None]
         if not bends:
             return self.ends
         breaks = np.sort(np.concatenate([self.ends, *bends]))
@@ -89,13 +89,13 @@ class Route:
     @cached_property
     def spans(self) -> Array:
         """The lengths [mm] where cubics of dense pieces begin and end, which every grid includes."""
-        spans = [self.ends[k] + p.dense.spans for k, p in enumerate(self.pieces) if p.dense is not None]
+        spans = [self.ends[k] + piece.dense.spans for k, piece in enumerate(self.pieces) if piece.dense is not None]
         return np.concatenate(spans) if spans else np.zeros(0)
 
     @cached_property
     def given_points(self) -> tuple[Array, Array]:
         """Points that the route was fitted to: where each is passed (N,) [mm], and its position (N, 2 or 3)."""
-        dense = [(self.ends[k], p.dense) for k, p in enumerate(self.pieces) if p.dense is not None]
+        dense = [(self.ends[k], piece.dense) for k, piece in enumerate(self.pieces) if piece.dense is not None]
         if not dense:
             return np.zeros(0), np.zeros((0, self.task.position))
         return np.concatenate([begin + d.given for begin, d in dense]), np.concatenate([d.points for _, d in dense])
@@ -109,8 +109,8 @@ class Route:
             if piece.dense is None or len(piece.dense.begins) == 0:
                 rows.append(np.array([[begin, *(np.nan if x is None else x for x in paces)]]))
             else:
-                d = piece.dense
-                rows.append(np.stack([np.maximum(begin + d.begins, begin), d.speed, d.tool_speed], axis=1))
+                dense = piece.dense
+                rows.append(np.stack([np.maximum(begin + dense.begins, begin), dense.speed, dense.tool_speed], axis=1))
         table = np.concatenate(rows)
         return table[:, 0], table[:, 1], table[:, 2]
 
@@ -181,7 +181,7 @@ def join_pieces(
             rounded = blend(task, previous, piece, radius, side)
             middle = rounded.middle
             if blend_radius is None:
-                middle = replace(middle, dense=_dense_of_corner(middle, piece.first.p))
+                middle = replace(middle, dense=_dense_of_corner(middle, piece.first.position))
             else:
                 reduced.note(blend_radius, rounded.radius)
             parts = [part for part in (rounded.first, middle) if part.length > MIN_LENGTH]
@@ -225,5 +225,7 @@ def both_move(a: Piece, b: Piece) -> bool:
 
 
 def _position_moves(piece: Piece) -> bool:
-    p = [piece.curve(np.array([f * piece.length]))[0, : piece.task.position] for f in (0.0, 0.5, 1.0)]
-    return bool(max(np.linalg.norm(p[0] - p[1]), np.linalg.norm(p[1] - p[2])) > 1e-6)
+    points = [
+        piece.curve(np.array([fraction * piece.length]))[0, : piece.task.position] for fraction in (0.0, 0.5, 1.0)
+    ]
+    return bool(max(np.linalg.norm(points[0] - points[1]), np.linalg.norm(points[1] - points[2])) > 1e-6)
