@@ -119,7 +119,7 @@ def solve_by(  # noqa: C901 - the examinations after the closed form, in their o
     nears = np.broadcast_to(reference, (len(targets), arm.n)) if is_shared else reference.reshape(-1, arm.n)
     common = reference if reference.ndim == 1 else None
     if geometry.pairs:
-        solved = chunks.solve(Goals(arm, task, targets, nears), geometry, common, examine, workers)
+        solved = chunks.solve_closed_form(Goals(arm, task, targets, nears), geometry, common, examine, workers)
         batch, count, target, defect, unsolved = solved
         goals = Goals(arm, task, target, nears)
         if len(unsolved):
@@ -189,7 +189,7 @@ def _by_slower_class(
     part = goals.of(doubted)
     if not geometry.pairs:
         return replace_rows(batch, doubted, _row_by_row(part, geometry, examine, workers)[0])
-    solved, _, target, _, unsolved = chunks.solve(part, geometry, None, examine, workers)
+    solved, _, target, _, unsolved = chunks.solve_closed_form(part, geometry, None, examine, workers)
     if len(unsolved):
         solved = _by_slower_class(part._replace(target=target), geometry.doubts, solved, unsolved, examine, workers)
     return replace_rows(batch, doubted, solved)

@@ -1,9 +1,9 @@
 """Solves batches by closed forms, in chunks of poses that fit the cache."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, empty_batch, pack_branches
 from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_copy
-from armkin.inverse.closed.candidates import recorded_formula, target_entries
+from armkin.inverse.closed.candidates import Recorded, recorded_formula, target_entries
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.run.edges import AT_ONCE, decide_edges
@@ -38,7 +38,7 @@ class Solved(NamedTuple):
     unsolved: Int  # targets on an edge, if the class has a slower solver for them
 
 
-def solve(goals: Goals, geometry: Geometry, common: Array | None, examine: bool, workers: int) -> Solved:  # noqa: C901 - one pass over a batch's arrays
+def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, examine: bool, workers: int) -> Solved:
     """All branches of targets, whose poses need not have been read yet; common: (n,) `near`, if one serves all."""
     arm, task, raw, near = goals
     runner, N = recorded_formula(arm, task, geometry), len(raw)
@@ -47,83 +47,102 @@ def solve(goals: Goals, geometry: Geometry, common: Array | None, examine: bool,
     target, rounding = np.empty_like(raw), np.zeros(N)
     tip = None if common is None else position(arm, common)
 
-    def solve_part(rows: slice) -> list[Doubted]:
-        """Solve some rows in one thread; returns those on an edge."""
+    def solve_rows(rows: slice) -> list[Doubted]:
+        """Solve some rows in one thread, chunk after chunk; returns those on an edge."""
         workspace: list[NDArray[Any]] = []
         on_edge: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal, columns, close = raw[chunk], None, near[chunk] if common is None else common
-            if task.orientation == "full":
-                goal, rounding[chunk], columns = read_poses(goal)
+            goal, rounding[chunk], entries = _read_chunk(task, raw[chunk])
             target[chunk] = goal
             if len(goal) == 1:
-                values = runner.in_numbers(goal)
+                outputs = runner.in_numbers(goal)
             else:
                 workspace = workspace or runner.code.workspace(len(goal))
-                buffers = [buffer[..., : len(goal)] for buffer in workspace]
-                values = list(runner.code.run(target_entries(task, goal) if columns is None else columns, buffers))
-            x = goal[:, 0] if columns is None else cast("Array", columns[9])
+                outputs = list(runner.code.run(entries, [buffer[..., : len(goal)] for buffer in workspace]))
+            close = near[chunk] if common is None else common
             at_tip = np.empty(0, np.intp)
             if examine:
-                at_tip = near_itself.at_tip(arm, task, goal, position(arm, close) if tip is None else tip, x)
+                tips, x = position(arm, close) if tip is None else tip, entries[9 if task.orientation == "full" else 0]
+                at_tip = near_itself.at_tip(arm, task, goal, tips, x)
             part = Goals(arm, task, goal, near[chunk])
-            doubted = _write(part, runner.axes, rows_of(batch, chunk), values, close, at_tip)
+            doubted = _write_chunk(part, (*runner.axes, len(goal)), rows_of(batch, chunk), outputs, close, at_tip)
             if len(doubted.rows):
                 on_edge.append(doubted._replace(rows=start + doubted.rows))
         return on_edge
 
-    parts = [solve_part(slice(0, N))] if workers == 1 else share_rows(solve_part, N, workers, step, step)
-    doubted = [chunk for on_edge in parts for chunk in on_edge]
+    doubted = [chunk for part in share_rows(solve_rows, N, workers, step, step) for chunk in part]
     batch.complete[...] = geometry.complete
-    rows = np.concatenate([np.empty(0, np.intp), *(chunk.rows for chunk in doubted)])
-    if geometry.doubts is None:
-        if examine and doubted:
-            goals = goals._replace(target=target)
-            if any(chunk.plain.any() for chunk in doubted) and not geometry.ends:
-                rows = decide_folds(goals, runner, batch, stack_rows(doubted))
-            for start in range(0, len(rows), AT_ONCE):
-                batch = decide_edges(goals, runner, batch, rows[start : start + AT_ONCE])
-        rows = rows[:0]
-    return Solved(batch, math.prod(runner.axes), target, rounding, rows)
+    unsolved = np.empty(0, np.intp)
+    if geometry.doubts is not None:
+        unsolved = np.concatenate([unsolved, *(chunk.rows for chunk in doubted)])
+    elif examine and doubted:
+        batch = _decide_doubted(goals._replace(target=target), runner, batch, stack_rows(doubted))
+    return Solved(batch, math.prod(runner.axes), target, rounding, unsolved)
 
 
-def _write(goals: Goals, axes: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, at_tip: Int) -> Doubted:
-    """Write a chunk's branches, on axes (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
+def _read_chunk(task: Task, raw: Array) -> tuple[Array, Array | float, Sequence[Any]]:
+    """Targets as they are solved, the defects of their rotations, and their entries as arrays."""
+    return read_poses(raw) if task.orientation == "full" else (raw, 0.0, target_entries(task, raw))
+
+
+def _decide_doubted(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Batch:
+    """The batch after an examination of targets on an edge: of folds by their curvature, else in full."""
+    rows = doubted.rows
+    if doubted.plain.any() and not runner.geometry.ends:
+        rows = decide_folds(goals, runner, batch, doubted)
+    for start in range(0, len(rows), AT_ONCE):
+        batch = decide_edges(goals, runner, batch, rows[start : start + AT_ONCE])
+    return batch
+
+
+def _write_chunk(
+    goals: Goals, shape: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, at_tip: Int
+) -> Doubted:
+    """Write a chunk's branches, of a shape (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
     targets on an edge. at_tip: the result of `near_itself.at_tip`, empty without examination.
     """
-    arm = goals.arm
-    *values, miss, doubt, free = outputs
-    N = len(part.q)
-    shape, B = (*axes, N), math.prod(axes)
-    miss = (miss if np.shape(miss) == shape else np.broadcast_to(miss, shape)).reshape(B, N)
-    valid = within = miss <= tol.ACCEPTED**2
-    all_valid, legal = bool(valid.all()), np.empty((*axes, arm.n, N))
-    for i, value in enumerate(values):
-        lower, upper = float(arm.lower[i]), float(arm.upper[i])
-        reference = float(near[i]) if near.ndim == 1 else near[:, i]
-        value, is_inside = nearest_copy(value, reference, lower, upper, bool(arm.prismatic[i]))
-        legal[..., i, :] = value
-        if is_inside is not True:
-            within = (within.reshape(shape) & is_inside).reshape(B, N)
-    columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
-    for chunk in arrays.slices(N, TURNED_AT_ONCE):
-        rows[chunk] = columns[:, chunk].T
-    part.valid[...] = True if all_valid else valid.T
-    part.within[...] = part.valid if within is valid else within.T
-    part.branch[...] = _every_branch(B, arrays.CHUNK)[:N]
-    on_edge = _on_edge(doubt, miss, None if all_valid else valid)
+    *values, miss, doubt, _ = outputs
+    miss = np.broadcast_to(miss, shape)
+    valid = (miss <= tol.ACCEPTED**2).reshape(-1, shape[-1])
+    some_invalid = None if valid.all() else valid
+    _write_branches(goals.arm, part, shape, values, near, valid)
+    on_edge = _on_edge(doubt, miss.reshape(valid.shape), some_invalid)
     if len(at_tip):
         on_edge = np.union1d(on_edge, near_itself.put_near(goals, part, at_tip))
-    flags = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in (miss.reshape(shape), doubt, free))
-    missed, edge, loose = flags if len(on_edge) else np.empty((3, 0, B))
-    plain: Bool = np.asarray(~(loose > 0.0).any(axis=1) & np.isin(on_edge, at_tip, invert=True))
-    doubted = Doubted(on_edge, part.q[on_edge], missed, edge > 0.0, plain)
-    if not all_valid:
+    doubted = _collect_doubts(part, shape, outputs[-3:], on_edge, at_tip)
+    if some_invalid is not None:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
         pack_branches(part, count)
     return doubted
+
+
+def _write_branches(arm: Arm, part: Batch, shape: tuple[int, ...], values: list[Any], near: Array, valid: Bool) -> None:
+    """Write all branches, values of a shape (b0, b1, b2, N) of which those are valid (B, N), into a part of a batch."""
+    *axes, N = shape
+    legal, within = np.empty((*axes, arm.n, N)), valid
+    for i, value in enumerate(values):
+        lower, upper = float(arm.lower[i]), float(arm.upper[i])
+        reference = float(near[i]) if near.ndim == 1 else near[:, i]
+        legal[..., i, :], is_inside = nearest_copy(value, reference, lower, upper, bool(arm.prismatic[i]))
+        if is_inside is not True:
+            within = (within.reshape(shape) & is_inside).reshape(valid.shape)
+    columns, rows = legal.reshape(-1, N), part.q.reshape(N, -1)
+    for chunk in arrays.slices(N, TURNED_AT_ONCE):
+        rows[chunk] = columns[:, chunk].T
+    part.valid[...] = valid.T
+    part.within[...] = part.valid if within is valid else within.T
+    part.branch[...] = _every_branch(len(valid), arrays.CHUNK)[:N]
+
+
+def _collect_doubts(part: Batch, shape: tuple[int, ...], outputs: list[Any], on_edge: Int, at_tip: Int) -> Doubted:
+    """Targets on an edge and their candidates: what these miss, squared, their doubts and whether a joint is free."""
+    B = part.q.shape[1]
+    at_edge = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in outputs)
+    miss, doubt, is_free = at_edge if len(on_edge) else np.empty((3, 0, B))
+    plain: Bool = np.asarray(~(is_free > 0.0).any(axis=1) & np.isin(on_edge, at_tip, invert=True))
+    return Doubted(on_edge, part.q[on_edge], miss, doubt > 0.0, plain)
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
