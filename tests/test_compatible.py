@@ -13,7 +13,7 @@ import pytest
 
 import armkin
 from armkin.cli.app import load_command
-from armkin.cli.negative_numbers import options_first
+from armkin.cli.parsing.negative_numbers import options_first
 from command_line import run
 
 BEFORE: dict[str, Any] = json.loads((Path(__file__).parent / "snapshots" / "interface_0_1_0.json").read_text())

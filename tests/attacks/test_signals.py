@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armkin.cli.csv_to_numbers import Columns
+from armkin.cli.parsing.csv_to_numbers import Columns
 from command_line import ROOT
 
 ARMKIN = [sys.executable, "-m", "armkin"]

@@ -98,7 +98,7 @@ def places_agree(solve: Any = armkin.ik) -> bool:
 
 def compiled_agrees() -> bool:
     """The same by machine code."""
-    from armkin.cli import compiled_ik
+    from armkin.cli.batches import compiled_ik
 
     return places_agree(compiled_ik.ik)
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from armkin.cli.negative_numbers import options_first
-from armkin.cli.number_parsing import comma_separated, number, numbers, whole_number
+from armkin.cli.parsing.negative_numbers import options_first
+from armkin.cli.parsing.number_parsing import comma_separated, number, numbers, whole_number
 from armkin.errors import UsageError
 from command_line import THREE_DOF, run
 

@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli.csv_to_numbers import batch_rows
-from armkin.cli.row_chunks import CHUNK_ROWS, Chunk
+from armkin.cli.parsing.csv_to_numbers import batch_rows
+from armkin.cli.parsing.row_chunks import CHUNK_ROWS, Chunk
 from armkin.errors import UsageError
 from command_line import ROOT, THREE_DOF, run
 
@@ -207,7 +207,7 @@ def test_out_follows_a_link(tmp_path: Path) -> None:
 
 
 def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("armkin.cli.csv_to_numbers.CHUNK_ROWS", 2000)
+    monkeypatch.setattr("armkin.cli.parsing.csv_to_numbers.CHUNK_ROWS", 2000)
 
     def peak(count: int) -> int:
         path = tmp_path / "in.csv"

@@ -266,7 +266,7 @@ def test_a_batch_in_a_folder_that_may_not_be_written_has_nothing_to_go_on_with(
 
 
 def test_a_bug_is_told_as_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    from armkin.cli import arguments
+    from armkin.cli.parsing import arguments
 
     def bug(*_: object) -> None:
         raise ZeroDivisionError("division by zero")

@@ -43,7 +43,7 @@ def test_the_same_across_chunks_and_unreachable_rows(winding_path: np.ndarray, m
     lines.insert(30, b"9000,0,0,0,0,0")
     words = ("ik", "ur5e", "--batch", "-", "--continuous", "--near", start)
     in_one_chunk = run(*words, "--json", stdin=b"\n".join(lines))
-    monkeypatch.setattr("armkin.cli.csv_to_numbers.CHUNK_ROWS", 7)
+    monkeypatch.setattr("armkin.cli.parsing.csv_to_numbers.CHUNK_ROWS", 7)
     parts = run(*words, "--json", stdin=b"\n".join(lines))
     assert in_one_chunk.code == parts.code == 3
     assert [line["best"] for line in parts.lines] == [line["best"] for line in in_one_chunk.lines]

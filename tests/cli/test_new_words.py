@@ -10,7 +10,7 @@ import sys
 
 import pytest
 
-from armkin.cli import output
+from armkin.cli.printing import output
 from command_line import ROOT, run, run_process
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from armkin.cli import board_link
+from armkin.cli.boards import board_link
 
 
 def test_the_notes_of_a_port_come_once_a_day(

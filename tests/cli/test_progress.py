@@ -8,7 +8,7 @@ import time
 
 import pytest
 
-from armkin.cli import output, progress_bar
+from armkin.cli.printing import output, progress_bar
 
 
 class _Terminal(io.StringIO):

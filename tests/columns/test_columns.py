@@ -14,8 +14,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from armkin.cli import batch_answers, csv_to_numbers
-from armkin.cli.csv_to_numbers import Columns
+from armkin.cli.batches import batch_answers
+from armkin.cli.parsing import csv_to_numbers
+from armkin.cli.parsing.csv_to_numbers import Columns
 from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, take_rows

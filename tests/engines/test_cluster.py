@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli import csv_to_numbers
+from armkin.cli.parsing import csv_to_numbers
 from armkin.engines import dask_cluster
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ClusterError

@@ -113,7 +113,7 @@ def test_a_piped_answer_keeps_its_scene(table: str, tmp_path: Path) -> None:
 
 
 def test_a_port_remembers_its_scene(table: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from armkin.cli import keep_outs
+    from armkin.cli.boards import keep_outs
     from armkin.errors import UsageError
 
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.cli import compiled_ik
+from armkin.cli.batches import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of

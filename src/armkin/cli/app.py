@@ -14,9 +14,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperCommand, TyperGroup
 
-from armkin.cli import link_trace, output
+from armkin.cli.boards import link_trace
 from armkin.cli.commands import COMMANDS
-from armkin.cli.negative_numbers import options_first
+from armkin.cli.parsing.negative_numbers import options_first
+from armkin.cli.printing import output
 from armkin.signals import put_off
 
 _INTERRUPT_CODE = 130  # exit code after Ctrl-C

@@ -10,10 +10,10 @@ from difflib import get_close_matches
 from typing import Any
 
 from armkin import errors
-from armkin.cli import output
 from armkin.cli.commands import COMMANDS
+from armkin.cli.printing import output
 
-RUNTIME = 1  # exit codes; those of a batch: `cli.batch_answers.Tally`
+RUNTIME = 1  # exit codes; those of a batch: `cli.batches.batch_answers.Tally`
 USAGE = 2
 NO_SOLUTION = 3
 ROBOT_FILE = 4
@@ -110,7 +110,7 @@ def _similar_options(error: Any, context: Any) -> list[str]:
 def _unexpected_code(error: BaseException) -> int:
     """Typer's own complaints about the command line, and our bugs."""
     if hasattr(error, "format_message"):  # click's exceptions; Typer does not export their base
-        from armkin.cli.number_parsing import is_number
+        from armkin.cli.parsing.number_parsing import is_number
 
         message = str(error.format_message()).rstrip(".")
         context = getattr(error, "ctx", None)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from armkin.cli import output
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 _FIRST_REPEAT_TIME = 0.8  # longest time [s] to the first repeat of a held key, on any system

@@ -6,11 +6,13 @@ import difflib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armkin.cli import arguments, board_link, keep_outs, output
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.keep_outs import NoScene
-from armkin.cli.options import Robot, RobotOut, Scene
+from armkin.cli.boards import board_link, keep_outs
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.boards.keep_outs import NoScene
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.options import Robot, RobotOut, Scene
+from armkin.cli.printing import output
 from armkin.cli.terminal_keys import Keys, keys
 from armkin.errors import ArmkinError, FileError, UsageError
 

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import armkin
-from armkin.cli import arguments, output, render
-from armkin.cli.csv_to_numbers import batch_rows
-from armkin.cli.options import Json, Out, Robot
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.csv_to_numbers import batch_rows
+from armkin.cli.parsing.options import Json, Out, Robot
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.target_numbers import targets_in

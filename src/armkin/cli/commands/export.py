@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import arguments, output, render
-from armkin.cli.options import Meshes, Out, Robot, Scene, TaskName
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.options import Meshes, Out, Robot, Scene, TaskName
+from armkin.cli.printing import output, render
 from armkin.errors import RedundantArmError, UsageError
 
 if TYPE_CHECKING:

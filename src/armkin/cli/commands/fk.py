@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import armkin
-from armkin.cli import arguments, output, render
-from armkin.cli.options import (
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.options import (
     Batch,
     BatchOut,
     Cluster,
@@ -24,8 +24,9 @@ from armkin.cli.options import (
     Tool,
     Workers,
 )
-from armkin.cli.render import fixed_text
-from armkin.cli.row_chunks import Chunk, one_row
+from armkin.cli.parsing.row_chunks import Chunk, one_row
+from armkin.cli.printing import output, render
+from armkin.cli.printing.render import fixed_text
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -61,8 +62,8 @@ def fk(
                 write(f"{render.to_json(answer)}\n" if json else _text(arm, answer))
             render.warn_of_limits(arm, answer["violations"], answer)
             return
-    from armkin.cli.batch_answers import BatchRun
-    from armkin.cli.batch_pieces import InputRows
+    from armkin.cli.batches.batch_answers import BatchRun
+    from armkin.cli.batches.batch_pieces import InputRows
 
     rows = InputRows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {
@@ -109,7 +110,7 @@ def _arm_and_poses(
     if q:
         arm = arguments.load_arm(arguments.required_robot(robot), scene, tool)
         return arm, [arguments.joints(arm, q)]
-    from armkin.cli import piped_answers
+    from armkin.cli.parsing import piped_answers
 
     return piped_answers.arm_and_poses(robot, q, scene, tool)
 

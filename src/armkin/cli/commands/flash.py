@@ -4,10 +4,11 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import arguments, completion, output, render
-from armkin.cli.board_link import SIM
-from armkin.cli.default_port import only_port, port_option
-from armkin.cli.options import Json
+from armkin.cli.boards.board_link import SIM
+from armkin.cli.boards.default_port import only_port, port_option
+from armkin.cli.parsing import arguments, completion
+from armkin.cli.parsing.options import Json
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 
 

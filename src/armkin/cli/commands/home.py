@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import board_link, completion, keep_outs, output, render
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.keep_outs import NoScene
-from armkin.cli.options import Json, Robot, Scene
+from armkin.cli.boards import board_link, keep_outs
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.boards.keep_outs import NoScene
+from armkin.cli.parsing import completion
+from armkin.cli.parsing.options import Json, Robot, Scene
+from armkin.cli.printing import output, render
 from armkin.model import units
 
 if TYPE_CHECKING:

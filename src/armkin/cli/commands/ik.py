@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import armkin
-from armkin.cli import arguments, compiled_ik, ik_text, lock_and_sweep, output, piped_answers, render
-from armkin.cli.ik_answer import answer_of, closest_pose, nearest_to
-from armkin.cli.number_parsing import decimal_count
-from armkin.cli.options import (
+from armkin.cli.batches import compiled_ik
+from armkin.cli.parsing import arguments, lock_and_sweep, piped_answers
+from armkin.cli.parsing.number_parsing import decimal_count
+from armkin.cli.parsing.options import (
     AllBranches,
     Batch,
     BatchOut,
@@ -33,7 +33,9 @@ from armkin.cli.options import (
     Tool,
     Workers,
 )
-from armkin.cli.row_chunks import Chunk, one_row
+from armkin.cli.parsing.row_chunks import Chunk, one_row
+from armkin.cli.printing import ik_text, output, render
+from armkin.cli.printing.ik_answer import answer_of, closest_pose, nearest_to
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.target_numbers import label_units, targets_in, targets_out
@@ -106,8 +108,8 @@ def ik(
     request = _request_with_solver(request, chosen_task.name, compiled=compiled)
     questions = IkQuestions(request, chosen_task, all_branches, turns, continuous)
     if batch is not None or (reached is not None and len(reached) > 1):
-        from armkin.cli.batch_answers import BatchRun
-        from armkin.cli.batch_pieces import InputRows
+        from armkin.cli.batches.batch_answers import BatchRun
+        from armkin.cli.batches.batch_pieces import InputRows
 
         arguments.no_numbers(target)
         rows = InputRows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])

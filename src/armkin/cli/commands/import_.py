@@ -9,8 +9,8 @@ import typer
 
 import armkin
 from armkin import files
-from armkin.cli import output
-from armkin.cli.options import RobotOut
+from armkin.cli.parsing.options import RobotOut
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import armkin
-from armkin.cli import arguments, output, render
-from armkin.cli.options import Json, Robot, Scene, TaskName, TextOut
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.options import Json, Robot, Scene, TaskName, TextOut
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.target_numbers import label_units
@@ -29,7 +30,7 @@ def info(robot: Robot, task: TaskName = None, scene: Scene = None, json: Json = 
         if json:
             write(f"{render.to_json(answer)}\n")
         else:
-            from armkin.cli.info_text import arm_summary
+            from armkin.cli.printing.info_text import arm_summary
 
             write(arm_summary(answer))
 

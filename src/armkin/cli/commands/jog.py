@@ -4,12 +4,14 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import board_link, completion, keep_outs, output, render
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.number_parsing import number
-from armkin.cli.options import Json, Robot, Scene
+from armkin.cli.boards import board_link, keep_outs
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.boards.keep_outs import Ignore, NoScene
+from armkin.cli.parsing import completion
+from armkin.cli.parsing.number_parsing import number
+from armkin.cli.parsing.options import Json, Robot, Scene
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 from armkin.model import units
 

@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import arguments, output
-from armkin.cli.number_parsing import number, of_pi, whole_number
-from armkin.cli.options import RobotOut
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import number, of_pi, whole_number
+from armkin.cli.parsing.options import RobotOut
+from armkin.cli.printing import output
 from armkin.errors import FileError, RobotFileError, UsageError
 
 if TYPE_CHECKING:

@@ -9,12 +9,14 @@ import typer
 
 import armkin
 from armkin import files
-from armkin.cli import arguments, board_link, drawing_path, keep_outs, lock_and_sweep, output, path_text, render
-from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
-from armkin.cli.drawing_path import At, Feed, GripBy, Lift, Scale
-from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.number_parsing import comma_separated, number, whole_number
-from armkin.cli.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
+from armkin.cli.boards import board_link, keep_outs
+from armkin.cli.boards.board_link import SIM, Assume, Baud, Link, NoReset, Resume
+from armkin.cli.boards.keep_outs import Ignore, NoScene
+from armkin.cli.parsing import arguments, drawing_path, lock_and_sweep
+from armkin.cli.parsing.drawing_path import At, Feed, GripBy, Lift, Scale
+from armkin.cli.parsing.number_parsing import comma_separated, number, whole_number
+from armkin.cli.parsing.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
+from armkin.cli.printing import output, path_text, render
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
-from armkin.cli import arguments, compiled_ik, output, render
-from armkin.cli.number_parsing import comma_separated, number
-from armkin.cli.options import Cluster, Compiled, Json, Picture, Scene, Workers
+from armkin.cli.batches import compiled_ik
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import comma_separated, number
+from armkin.cli.parsing.options import Cluster, Compiled, Json, Picture, Scene, Workers
+from armkin.cli.printing import output, render
 from armkin.errors import NoSolutionError, UsageError
 
 if TYPE_CHECKING:
@@ -129,7 +131,7 @@ def _targets(arm: Arm, source: str) -> Array:
     """The targets of a file, as the arm's task reads them."""
     import numpy as np
 
-    from armkin.cli.csv_to_numbers import batch_rows
+    from armkin.cli.parsing.csv_to_numbers import batch_rows
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.model.target_numbers import targets_in
 

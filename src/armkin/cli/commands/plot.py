@@ -6,10 +6,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import arguments, lock_and_sweep, piped_answers, render
-from armkin.cli.csv_to_numbers import batch_rows
-from armkin.cli.number_parsing import comma_separated
-from armkin.cli.options import Joints, Lock, RobotOrPipe, Scene, TaskName
+from armkin.cli.parsing import arguments, lock_and_sweep, piped_answers
+from armkin.cli.parsing.csv_to_numbers import batch_rows
+from armkin.cli.parsing.number_parsing import comma_separated
+from armkin.cli.parsing.options import Joints, Lock, RobotOrPipe, Scene, TaskName
+from armkin.cli.printing import render
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 from armkin.model.target_numbers import label_units, targets_in

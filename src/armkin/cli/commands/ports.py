@@ -1,7 +1,7 @@
 """`armkin ports`."""
 
-from armkin.cli import output, render
-from armkin.cli.options import Json
+from armkin.cli.parsing.options import Json
+from armkin.cli.printing import output, render
 
 
 def ports(json: Json = False) -> None:

@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any, NamedTuple, cast
 import typer
 
 import armkin
-from armkin.cli import arguments, output, piped_answers, render
-from armkin.cli.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
-from armkin.cli.render import fixed_text
-from armkin.cli.row_chunks import Chunk, one_row
+from armkin.cli.parsing import arguments, piped_answers
+from armkin.cli.parsing.options import Batch, BatchOut, Cluster, Joints, JsonLines, Resume, RobotOrPipe, Scene, Workers
+from armkin.cli.parsing.row_chunks import Chunk, one_row
+from armkin.cli.printing import output, render
+from armkin.cli.printing.render import fixed_text
 from armkin.model import units
 
 if TYPE_CHECKING:
@@ -62,8 +63,8 @@ def pulses(
         for name in answer["outside_travel"]:
             output.warn(f"the servo of {name} cannot turn that far: its pulses are outside its range")
         return
-    from armkin.cli.batch_answers import BatchRun
-    from armkin.cli.batch_pieces import InputRows
+    from armkin.cli.batches.batch_answers import BatchRun
+    from armkin.cli.batches.batch_pieces import InputRows
 
     rows = InputRows(batch, arm.joint_names, arm.name, units.poses_out(arm), values)
     identity = {"command": "pulses", "robot file": arm.sha256, "scene": arm.scene_sha256, "from": origin, "best": best}

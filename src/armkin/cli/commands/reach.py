@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 import armkin
-from armkin.cli import arguments, output, render
-from armkin.cli.number_parsing import number, whole_number
-from armkin.cli.options import Cluster, Json, Picture, Robot, Scene, Workers
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import number, whole_number
+from armkin.cli.parsing.options import Cluster, Json, Picture, Robot, Scene, Workers
+from armkin.cli.printing import output, render
 
 if TYPE_CHECKING:
     from armkin.cli.answers import Reach as Answer

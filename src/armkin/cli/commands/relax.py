@@ -6,11 +6,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import arguments, board_link, output
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.number_parsing import number
-from armkin.cli.options import Robot, RowsOut
+from armkin.cli.boards import board_link
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import number
+from armkin.cli.parsing.options import Robot, RowsOut
+from armkin.cli.printing import output
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import UsageError
 from armkin.model import units

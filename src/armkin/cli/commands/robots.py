@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import armkin
-from armkin.cli import output, render
-from armkin.cli.options import Json, TextOut
+from armkin.cli.parsing.options import Json, TextOut
+from armkin.cli.printing import output, render
 
 if TYPE_CHECKING:
     from armkin.cli.answers import ShippedRobot

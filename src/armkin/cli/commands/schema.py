@@ -4,8 +4,8 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import output
-from armkin.cli.options import SchemaOut
+from armkin.cli.parsing.options import SchemaOut
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 

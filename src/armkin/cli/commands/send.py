@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import armkin
-from armkin.cli import arguments, board_link, keep_outs, output, render
-from armkin.cli.board_link import SIM, Assume, Baud, Link, NoReset, Resume
-from armkin.cli.default_port import PortName
-from armkin.cli.keep_outs import Ignore, NoScene
-from armkin.cli.number_parsing import number
-from armkin.cli.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
-from armkin.cli.send_goals import TargetOptions
-from armkin.cli.send_goals import read_goals as read_goals
+from armkin.cli.boards import board_link, keep_outs
+from armkin.cli.boards.board_link import SIM, Assume, Baud, Link, NoReset, Resume
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.boards.keep_outs import Ignore, NoScene
+from armkin.cli.boards.send_goals import TargetOptions
+from armkin.cli.boards.send_goals import read_goals as read_goals
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import number
+from armkin.cli.parsing.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
+from armkin.cli.printing import output, render
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from armkin.board.backend import Planned
     from armkin.board.backend.board import Board
     from armkin.board.planner import Planner, Stream
-    from armkin.cli.send_goals import Goals
+    from armkin.cli.boards.send_goals import Goals
     from armkin.errors import ArmkinError
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm

@@ -4,10 +4,12 @@ from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import arguments, board_link, output, render
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.options import Json, Robot
+from armkin.cli.boards import board_link
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.options import Json, Robot
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 
 

@@ -4,9 +4,10 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import board_link, output
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName, only_port
+from armkin.cli.boards import board_link
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName, only_port
+from armkin.cli.printing import output
 from armkin.errors import LinkError, UsageError
 
 _REST_TIMEOUT = 15.0  # time [s] for an arm to come to rest

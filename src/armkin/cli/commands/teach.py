@@ -6,10 +6,11 @@ from typing import Annotated
 
 import typer
 
-from armkin.cli import keep_outs, output
-from armkin.cli.board_link import SIM, Baud
-from armkin.cli.keep_outs import NoScene
-from armkin.cli.options import Meshes, Robot, Scene
+from armkin.cli.boards import keep_outs
+from armkin.cli.boards.board_link import SIM, Baud
+from armkin.cli.boards.keep_outs import NoScene
+from armkin.cli.parsing.options import Meshes, Robot, Scene
+from armkin.cli.printing import output
 
 
 def teach(

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import armkin
-from armkin.cli import arguments, output, render
-from armkin.cli.number_parsing import is_number, whole_number
-from armkin.cli.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
+from armkin.cli.parsing import arguments
+from armkin.cli.parsing.number_parsing import is_number, whole_number
+from armkin.cli.parsing.options import Cluster, Compiled, Json, Picture, Robot, Scene, Tool, Workers
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

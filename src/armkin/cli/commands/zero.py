@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import arguments, board_link, lerobot_zero, output, render
-from armkin.cli.board_link import Baud, NoReset
-from armkin.cli.default_port import PortName
-from armkin.cli.number_parsing import number
-from armkin.cli.options import Json, Robot, RobotOut
+from armkin.cli.boards import board_link
+from armkin.cli.boards.board_link import Baud, NoReset
+from armkin.cli.boards.default_port import PortName
+from armkin.cli.parsing import arguments, lerobot_zero
+from armkin.cli.parsing.number_parsing import number
+from armkin.cli.parsing.options import Json, Robot, RobotOut
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 from armkin.model import units
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import render
+from armkin.cli.printing import render
 
 if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan

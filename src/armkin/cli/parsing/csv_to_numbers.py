@@ -13,10 +13,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, TYPE_CHECKING
 
 from armkin import files
-from armkin.cli import output
-from armkin.cli.number_parsing import MAX_NUMBER, numbers
-from armkin.cli.row_chunks import CHUNK_ROWS as CHUNK_ROWS
-from armkin.cli.row_chunks import Chunk
+from armkin.cli.parsing.number_parsing import MAX_NUMBER, numbers
+from armkin.cli.parsing.row_chunks import CHUNK_ROWS as CHUNK_ROWS
+from armkin.cli.parsing.row_chunks import Chunk
+from armkin.cli.printing import output
 from armkin.errors import FileError, UsageError
 
 if TYPE_CHECKING:

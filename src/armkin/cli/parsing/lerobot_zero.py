@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import arguments, output, render
+from armkin.cli.parsing import arguments
+from armkin.cli.printing import output, render
 from armkin.errors import UsageError
 from armkin.files import protect_input
 from armkin.model import units

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import armkin
-from armkin.cli import arguments, lock_and_sweep, piped_answers
-from armkin.cli.csv_to_numbers import streamed_rows
-from armkin.cli.number_parsing import decimal_count
+from armkin.cli.parsing import arguments, lock_and_sweep, piped_answers
+from armkin.cli.parsing.csv_to_numbers import streamed_rows
+from armkin.cli.parsing.number_parsing import decimal_count
 from armkin.errors import FileError, NoSolutionError, UsageError
 from armkin.model import units
 from armkin.model.target_numbers import label_units, targets_in

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from armkin.cli import arguments, output
+from armkin.cli.parsing import arguments
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import output
+from armkin.cli.printing import output
 from armkin.model import units
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import arguments, completion, output, render
-from armkin.cli.default_port import port_name
-from armkin.cli.number_parsing import whole_number
+from armkin.cli.boards.default_port import port_name
+from armkin.cli.parsing import arguments, completion
+from armkin.cli.parsing.number_parsing import whole_number
+from armkin.cli.printing import output, render
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from armkin import files
-from armkin.cli import output
-from armkin.cli.number_parsing import MAX_NUMBER, number, place_numbers
+from armkin.cli.parsing.number_parsing import MAX_NUMBER, number, place_numbers
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

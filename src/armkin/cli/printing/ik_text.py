@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from armkin.cli import render
-from armkin.cli.render import fixed_text
+from armkin.cli.printing import render
+from armkin.cli.printing.render import fixed_text
 from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from armkin.cli.render import short_text, table, wrap_text
+from armkin.cli.printing.render import short_text, table, wrap_text
 
 
 def arm_summary(answer: Mapping[str, Any]) -> str:

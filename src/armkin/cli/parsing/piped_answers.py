@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli import arguments, output
+from armkin.cli.parsing import arguments
+from armkin.cli.printing import output
 from armkin.errors import FileError, NoSolutionError, UsageError
 
 if TYPE_CHECKING:

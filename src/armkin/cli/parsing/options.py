@@ -5,8 +5,9 @@ from typing import Annotated, Any
 
 import typer
 
-from armkin.cli import completion, output
-from armkin.cli.number_parsing import whole_number
+from armkin.cli.parsing import completion
+from armkin.cli.parsing.number_parsing import whole_number
+from armkin.cli.printing import output
 
 Robot = Annotated[
     str,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from armkin.cli.number_parsing import number, whole_number
+from armkin.cli.parsing.number_parsing import number, whole_number
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 

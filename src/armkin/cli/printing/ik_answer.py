@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import armkin
-from armkin.cli import render
+from armkin.cli.printing import render
 from armkin.model import units
 
 if TYPE_CHECKING:

@@ -11,10 +11,10 @@ from functools import partial
 from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__, files
-from armkin.cli import output
-from armkin.cli.batch_pieces import InputRows, Piece, parse_piece
-from armkin.cli.render import to_json
-from armkin.cli.row_chunks import Chunk
+from armkin.cli.batches.batch_pieces import InputRows, Piece, parse_piece
+from armkin.cli.parsing.row_chunks import Chunk
+from armkin.cli.printing import output
+from armkin.cli.printing.render import to_json
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.finished_chunks import Parts
 from armkin.columns.formats import Format, format_of

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from armkin.cli import output
+from armkin.cli.printing import output
 from armkin.model.target_numbers import label_units
 
 if TYPE_CHECKING:

@@ -205,7 +205,7 @@ def progress(task: str, total: int | Callable[[], int | None] | None = None) -> 
             return
         last = present
         if shown is None:
-            from armkin.cli.progress_bar import start_bar
+            from armkin.cli.printing.progress_bar import start_bar
 
             shown = start_bar(task)
         shown.update(count, known_total, present - began)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from armkin.cli import completion, output
+from armkin.cli.parsing import completion
+from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:

@@ -11,8 +11,9 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from armkin import files
-from armkin.cli import output, unit_notes
-from armkin.cli.number_parsing import NOT_FINITE, comma_separated, is_number, number, numbers, place_numbers
+from armkin.cli.parsing import unit_notes
+from armkin.cli.parsing.number_parsing import NOT_FINITE, comma_separated, is_number, number, numbers, place_numbers
+from armkin.cli.printing import output
 from armkin.errors import FileError, UsageError
 from armkin.model import units
 

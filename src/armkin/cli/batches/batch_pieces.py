@@ -9,10 +9,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armkin import files
-from armkin.cli import csv_to_numbers
-from armkin.cli.csv_to_numbers import Columns
-from armkin.cli.number_parsing import MAX_NUMBER
-from armkin.cli.row_chunks import Chunk
+from armkin.cli.parsing import csv_to_numbers
+from armkin.cli.parsing.csv_to_numbers import Columns
+from armkin.cli.parsing.number_parsing import MAX_NUMBER
+from armkin.cli.parsing.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
 
 if TYPE_CHECKING:
