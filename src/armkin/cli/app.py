@@ -29,7 +29,9 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse the options first, then the arguments."""
-        options = [p for p in self.params if p.param_type_name == "option" and not getattr(p, "is_flag", False)]
+        options = [
+            param for param in self.params if param.param_type_name == "option" and not getattr(param, "is_flag", False)
+        ]
         takes_value = [name for option in options for name in option.opts]
         if ctx.resilient_parsing and args and args[-1] in takes_value:
             args = args[:-1]  # Tab was pressed for its value
@@ -41,7 +43,7 @@ class Command(TyperCommand):
 
     def format_options(self, ctx: Any, formatter: Any) -> None:
         """Arguments and options, without Typer's names of Python types."""
-        options = [p.get_help_record(ctx) for p in self.get_params(ctx) if p.param_type_name == "option"]
+        options = [param.get_help_record(ctx) for param in self.get_params(ctx) if param.param_type_name == "option"]
         for title, entries in (("Arguments", self._arguments()), ("Options", options)):
             if entries:
                 with formatter.section(title):
@@ -49,8 +51,8 @@ class Command(TyperCommand):
 
     def _arguments(self) -> list[tuple[str, str]]:
         """Names and help texts of the arguments."""
-        arguments = [p for p in self.params if p.param_type_name == "argument"]
-        return [(str(p.metavar or p.name), str(getattr(p, "help", None) or "")) for p in arguments]
+        arguments = [param for param in self.params if param.param_type_name == "argument"]
+        return [(str(param.metavar or param.name), str(getattr(param, "help", None) or "")) for param in arguments]
 
 
 class Commands(TyperGroup):

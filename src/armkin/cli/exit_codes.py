@@ -101,7 +101,10 @@ def _similar_options(error: Any, context: Any) -> list[str]:
     if not isinstance(word, str) or context is None:
         return []
     option_names = [
-        name for p in context.command.params for name in (*p.opts, *p.secondary_opts) if name.startswith("--")
+        name
+        for param in context.command.params
+        for name in (*param.opts, *param.secondary_opts)
+        if name.startswith("--")
     ]
     begun = [name for name in option_names if len(word) > 3 and name.startswith(f"{word}-")]
     return list(getattr(error, "possibilities", None) or begun)

@@ -31,12 +31,14 @@ def pose_columns(arm: Arm, values: Array, T: Array | None = None) -> Table:
 def pulse_columns(arm: Arm, values: Array, best: bool = False) -> Table:
     """The columns of pulses: values (N, n) [deg | mm]; best: see `armkin.best_pulses`."""
     q = units.joints_in(arm, values)
-    r = motors.best_pulses(arm, q).chosen if best else motors.rounding(arm, q)
+    rounding = motors.best_pulses(arm, q).chosen if best else motors.rounding(arm, q)
     table: Table = _named_columns(arm.joint_names, values)
-    table |= _named_columns([f"pulses_{name}" for name in motors.motor_names(arm)], r.pulses)
-    table |= _named_columns([f"actual_{name}" for name in arm.joint_names], units.joints_out(arm, r.actual_joints))
-    table |= _named_columns("xyz", r.actual + 0.0)
-    table["error_mm"] = r.error
+    table |= _named_columns([f"pulses_{name}" for name in motors.motor_names(arm)], rounding.pulses)
+    table |= _named_columns(
+        [f"actual_{name}" for name in arm.joint_names], units.joints_out(arm, rounding.actual_joints)
+    )
+    table |= _named_columns("xyz", rounding.actual + 0.0)
+    table["error_mm"] = rounding.error
     table["within_limits"] = np.asarray(~limits.outside_limits(arm, q).any(axis=1))
     return table
 

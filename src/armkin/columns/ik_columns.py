@@ -51,18 +51,18 @@ def branch_columns(
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     free_indices = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
-    s = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[free_indices], **more)
-    q, within = s.q, s.within_limits
+    solutions = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[free_indices], **more)
+    q, within_limits = solutions.q, solutions.within_limits
     if request.held:
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
-        q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, s.q)
-        within = within & ~limits.outside_limits(arm, q).any(axis=-1)
-    free = within & s.clear if arm.keep_out else within
-    names = () if request.branch is None else find_branches(s.names, request.branch)
+        q = unlock(arm, {name: values[arm.joint_names.index(name)] for name in request.held}, solutions.q)
+        within_limits = within_limits & ~limits.outside_limits(arm, q).any(axis=-1)
+    is_free = within_limits & solutions.clear if arm.keep_out else within_limits
+    names = () if request.branch is None else find_branches(solutions.names, request.branch)
     parts = []
     for i in range(0, max(len(q), 1), BLOCK_TARGETS):
         block = slice(i, i + BLOCK_TARGETS)
-        answers = _Answers(s=s, rows=block, q=q, within_limits=within, free=free, near=near, names=names)
+        answers = _Answers(solutions, block, q, within_limits, is_free, near, names)
         parts.append(_list_branches(request, answers, rows, all_branches, quick))
     return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 
@@ -73,11 +73,11 @@ class _Answers(NamedTuple):
     names: the branches that may be taken, none for all.
     """
 
-    s: Solutions
+    solutions: Solutions
     rows: slice
     q: Array
     within_limits: Bool
-    free: Bool
+    is_free: Bool
     near: Array
     names: Sequence[int]
 
@@ -86,10 +86,10 @@ def _list_branches(
     request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
 ) -> BranchTable:
     """Lines of a block of targets: all their branches, or the nearest one; quick: what finds that in C, if it can."""
-    s, block, scale = answers.s, answers.rows, units.joint_scale(request.arm)
-    q, valid = answers.q[block], s.valid[block]
-    within, free = answers.within_limits[block], answers.free[block]
-    allowed = free if request.branch is None else free & np.isin(s.branch[block], answers.names)
+    solutions, block, scale = answers.solutions, answers.rows, units.joint_scale(request.arm)
+    q, valid = answers.q[block], solutions.valid[block]
+    within_limits, is_free = answers.within_limits[block], answers.is_free[block]
+    allowed = is_free if request.branch is None else is_free & np.isin(solutions.branch[block], answers.names)
     if all_branches:
         unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
         key = np.where(valid, motion.round(EQUAL_DECIMALS), np.inf)
@@ -97,8 +97,8 @@ def _list_branches(
         lines = np.maximum(count, 1)
         target = np.repeat(np.arange(len(lines)), lines)
         has_branch = np.repeat(count > 0, lines)
-        place = numbers_within(lines)
-        branch = _rank_branches(key, valid, within, free)[target[has_branch], place[has_branch]]
+        rank = numbers_within(lines)
+        branch = _rank_branches(key, valid, within_limits, is_free)[target[has_branch], rank[has_branch]]
         motion = motion[target[has_branch], branch]
     else:
         arguments = q, allowed, answers.near, scale
@@ -106,8 +106,8 @@ def _list_branches(
         target, has_branch = np.arange(len(best)), best >= 0
         unsolved, branch, motion = ~has_branch, best[has_branch], motion[has_branch]
     chosen = target[has_branch], branch
-    values = _Lines(target, has_branch, q[chosen], within[chosen], motion, *chosen)
-    return BranchTable(_branch_table(request, s, rows[block], block, values), unsolved)
+    values = _Lines(target, has_branch, q[chosen], within_limits[chosen], motion, *chosen)
+    return BranchTable(_branch_table(request, solutions, rows[block], block, values), unsolved)
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
@@ -131,13 +131,13 @@ def _any_column(flags: Bool) -> Bool:
     return any_flag
 
 
-def _rank_branches(key: Array, valid: Bool, within_limits: Bool, free: Bool) -> NDArray[np.intp]:
+def _rank_branches(key: Array, valid: Bool, within_limits: Bool, is_free: Bool) -> NDArray[np.intp]:
     """Branches (N, B) in the order of a list: free, with hits, outside limits; equal ones in their old order."""
     rank = np.argsort(key, axis=1, kind="stable")
-    mixed = np.flatnonzero((free != valid).any(axis=1))
+    mixed = np.flatnonzero((is_free != valid).any(axis=1))
     if len(mixed):
-        w, f = within_limits[mixed], free[mixed]
-        rank[mixed] = np.lexsort((key[mixed], w & ~f, ~w, ~valid[mixed]), axis=-1)
+        mixed_within, mixed_free = within_limits[mixed], is_free[mixed]
+        rank[mixed] = np.lexsort((key[mixed], mixed_within & ~mixed_free, ~mixed_within, ~valid[mixed]), axis=-1)
     return rank
 
 
@@ -177,37 +177,39 @@ class _Lines(NamedTuple):
 
 
 def _branch_table(
-    request: choose_branch.Request, s: Solutions, rows: NDArray[np.integer], rows_of_part: slice, lines: _Lines
+    request: choose_branch.Request, solutions: Solutions, rows: NDArray[np.integer], rows_of_part: slice, lines: _Lines
 ) -> Table:
     """One line for each target, or branch of it, with numbers where there is a branch."""
-    present, every = lines.has_branch, bool(lines.has_branch.all())
-    mm, rad = _residuals(request, s, rows_of_part, lines)
-    names = tuple(name.replace(",", "") for name in s.names)  # `cut` must see one column
+    present, all_present = lines.has_branch, bool(lines.has_branch.all())
+    distances, angles = _residuals(request, solutions, rows_of_part, lines)
+    names = tuple(name.replace(",", "") for name in solutions.names)  # `cut` must see one column
     label = np.full(len(present), -1)
-    label[present] = s.branch[rows_of_part][lines.target, lines.branch]
+    label[present] = solutions.branch[rows_of_part][lines.target, lines.branch]
     table: Table = {
         "row": rows[lines.line_target],
-        "status": Words(s.status[rows_of_part][lines.line_target], _STATUS),
+        "status": Words(solutions.status[rows_of_part][lines.line_target], _STATUS),
         "branch": Words(label, names),
     }
     joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
-    legal = np.zeros(len(present), bool)
-    legal[present] = lines.within_limits
-    table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": legal}
-    table |= {"residual_mm": mm, "residual_deg": units.angles_out(rad), "motion": lines.motion}
-    if every:
+    within_limits = np.zeros(len(present), bool)
+    within_limits[present] = lines.within_limits
+    table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": within_limits}
+    table |= {"residual_mm": distances, "residual_deg": units.angles_out(angles), "motion": lines.motion}
+    if all_present:
         return table
     numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
     return table | {name: _fill_gaps(np.asarray(table[name]), present) for name in numbers}
 
 
-def _residuals(request: choose_branch.Request, s: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
+def _residuals(request: choose_branch.Request, solutions: Solutions, part: slice, lines: _Lines) -> tuple[Array, Array]:
     """What some branches miss: (K,) [mm] and (K,) [rad]."""
-    q = s.q[part][lines.target, lines.branch] if request.held else lines.q
-    target = s.target[part] if len(q) == len(lines.has_branch) == len(s.target[part]) else s.target[part][lines.target]
-    missing = residual(s.task, request.fk(s.arm, q), q, target)
-    p = s.task.position
-    return _row_norms(missing[:, :p]), _row_norms(missing[:, p:])
+    q = solutions.q[part][lines.target, lines.branch] if request.held else lines.q
+    target = solutions.target[part]
+    if not len(q) == len(lines.has_branch) == len(target):
+        target = target[lines.target]
+    residuals = residual(solutions.task, request.fk(solutions.arm, q), q, target)
+    position_size = solutions.task.position
+    return _row_norms(residuals[:, :position_size]), _row_norms(residuals[:, position_size:])
 
 
 def _row_norms(values: Array) -> Array:

@@ -87,7 +87,9 @@ def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]
             for name, column in zip(chosen, columns, strict=True):
                 if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
                     raise UsageError(f"{path}: {name} is no column of numbers: its type is {column.type}")
-            yield np.column_stack([c.cast(pa.float64()).to_numpy(zero_copy_only=False) for c in columns])
+            yield np.column_stack(
+                [column_data.cast(pa.float64()).to_numpy(zero_copy_only=False) for column_data in columns]
+            )
     except (OSError, pa.ArrowException) as error:
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
 

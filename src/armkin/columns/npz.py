@@ -37,7 +37,7 @@ def encode_table(table: Table) -> bytes:
     columns = [
         (column.index, column.names) if isinstance(column, Words) else (column, None) for column in table.values()
     ]
-    head = [[name, len(v), v.dtype.str, words] for name, (v, words) in zip(table, columns, strict=True)]
+    head = [[name, len(array), array.dtype.str, words] for name, (array, words) in zip(table, columns, strict=True)]
     return b"".join([json.dumps(head).encode(), b"\n", *(np.ascontiguousarray(values).data for values, _ in columns)])
 
 

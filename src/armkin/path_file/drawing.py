@@ -24,9 +24,9 @@ class Placing:
     orientation: tuple[float, ...] = ()  # [deg, 1] the tool's orientation, the same everywhere
     scale: float = 1.0
 
-    def point(self, p: Sequence[float]) -> list[float]:
+    def point(self, point: Sequence[float]) -> list[float]:
         """A point of the drawing in the arm's frame."""
-        return self.points([p])[0]
+        return self.points([point])[0]
 
     def points(self, points: Iterable[Sequence[float]]) -> list[list[float]]:
         """Points of the drawing in the arm's frame."""
@@ -37,9 +37,9 @@ class Placing:
             for x, y, z in scaled
         ]
 
-    def direction(self, d: Sequence[float]) -> list[float]:
+    def direction(self, direction: Sequence[float]) -> list[float]:
         """A direction of the drawing in the arm's frame."""
-        return [a[0] * d[0] + a[1] * d[1] + a[2] * d[2] for a in self.axes]
+        return [a[0] * direction[0] + a[1] * direction[1] + a[2] * direction[2] for a in self.axes]
 
 
 @dataclass(frozen=True)
@@ -68,18 +68,18 @@ class Pen:
         self._drawn: list[list[Sequence[float]]] = []
         self._speed: float | None = None
 
-    def jump(self, p: Sequence[float], line: int) -> None:
+    def jump(self, point: Sequence[float], line: int) -> None:
         """A joint move to a point."""
-        self._add(Move.model_construct({"point"}, point=[*self.placing.point(p), *self.placing.orientation]), line)
+        self._add(Move.model_construct({"point"}, point=[*self.placing.point(point), *self.placing.orientation]), line)
 
-    def line(self, p: Sequence[float], speed: float | None, line: int) -> None:
+    def line(self, point: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
             opened: list[Sequence[float]] = []
             self._add(Move.model_construct({"polyline"}, polyline=opened, **_speed_key(speed)), line)
             self._open, self._speed = opened, speed
             self._drawn.append(opened)
-        self._open.append(p)
+        self._open.append(point)
         self.points += 1
 
     def arc(

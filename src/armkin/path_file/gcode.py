@@ -80,16 +80,16 @@ class _Program:
             if self._do_line():
                 return
 
-    def _plain_line(self, g: str | None, early: str | None, *words: str | None) -> bool:
+    def _plain_line(self, g_word: str | None, early_f: str | None, *words: str | None) -> bool:
         """Do a line of G0 or G1, F, X, Y, Z, E alone as `_do_line` does, sooner; False: `_do_line` has to."""
-        *axes, e, late = words
-        motion = self.motion if g is None else float(g)
-        if motion is None or motion > 1 or not (early is None or late is None):
+        *axes, e_word, late_f = words
+        motion = self.motion if g_word is None else float(g_word)
+        if motion is None or motion > 1 or not (early_f is None or late_f is None):
             return False
         self.motion = motion
-        if (feed := early or late) is not None:
+        if (feed := early_f or late_f) is not None:
             self.feed = float(feed) * self.unit
-        if e is not None:
+        if e_word is not None:
             self._ignore("E")
         if axes != _NO_AXES:
             goal = self._goal([number if number is None else float(number) for number in axes], machine=False)

@@ -78,22 +78,22 @@ def _equalised_centre(plane: tuple[int, int, int], centre: Point, a: Point, b: P
     along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size)
     if abs(along) > 2 * miss:
         return centre
-    moved = list(centre)
-    moved[x] += along * chord[0] / size
-    moved[y] += along * chord[1] / size
-    return moved[0], moved[1], moved[2]
+    centre_list = list(centre)
+    centre_list[x] += along * chord[0] / size
+    centre_list[y] += along * chord[1] / size
+    return centre_list[0], centre_list[1], centre_list[2]
 
 
-def _centre_by_radius(word: str, plane: tuple[int, int, int], r: float, a: Point, b: Point) -> Point:
-    """The centre of an arc of radius |r|, above 0 of at most half a turn, below 0 of more."""
+def _centre_by_radius(word: str, plane: tuple[int, int, int], radius: float, a: Point, b: Point) -> Point:
+    """The centre of an arc of this radius, above 0 of at most half a turn, below 0 of more."""
     x, y, _ = plane
     dx, dy = b[x] - a[x], b[y] - a[y]
     chord = math.hypot(dx, dy)
     if chord < 1e-9:
         raise ArcError(f"{word} with R begins where it ends: a whole circle needs I, J or K")
-    if chord > 2 * abs(r) * (1 + 1e-6) + 2 * _MISS:
-        raise ArcError(f"{word} R{r:g} is shorter than half of its chord of {chord:.6g} mm")
-    rise = math.sqrt(max(r * r - chord * chord / 4, 0.0)) * _sense(word) * (1 if r > 0 else -1)
+    if chord > 2 * abs(radius) * (1 + 1e-6) + 2 * _MISS:
+        raise ArcError(f"{word} R{radius:g} is shorter than half of its chord of {chord:.6g} mm")
+    rise = math.sqrt(max(radius * radius - chord * chord / 4, 0.0)) * _sense(word) * (1 if radius > 0 else -1)
     centre = list(a)
     centre[x] += dx / 2 - rise * dy / chord
     centre[y] += dy / 2 + rise * dx / chord

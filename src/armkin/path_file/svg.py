@@ -137,7 +137,9 @@ def _drawing_frame(root: _Element) -> Matrix:
 
 def _scales(size: Sequence[float | None], box: Sequence[float], ratio: str) -> tuple[float, float]:
     """The drawing's length of a unit of the viewBox along x and y; ratio: what preserveAspectRatio says."""
-    across, down = (None if s is None else s / b for s, b in zip(size, box, strict=True))
+    across, down = (
+        None if length is None else length / box_length for length, box_length in zip(size, box, strict=True)
+    )
     sx, sy = across or down or 1.0, down or across or 1.0
     if ratio.split()[:1] == ["none"]:
         return sx, sy
@@ -158,23 +160,23 @@ class _Drawer:
     elements: int = 0
     line: int = 0
 
-    def draw(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+    def draw(self, element: _Element, transform: Matrix, named: dict[str, _Element], depth: int) -> None:
         """An element and all in it; m: from where it stands to millimetres."""
         if not self._is_drawn(element, depth):
             return
         try:
-            m = multiply(m, parse_transform(element.attributes.get("transform", "")))
+            transform = multiply(transform, parse_transform(element.attributes.get("transform", "")))
             if element.tag == "use":
                 shift = (parse_length(element.attributes.get("x")), parse_length(element.attributes.get("y")))
-                self._draw_used(element, multiply(m, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
+                self._draw_used(element, multiply(transform, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
             elif element.tag in SHAPES:
-                for stroke in outlines(element.tag, element.attributes, m):
+                for stroke in outlines(element.tag, element.attributes, transform):
                     self._draw_stroke(element, stroke)
         except ShapeError as error:
             raise self._error(element, str(error)) from None
         if element.tag in _GROUPS and (element.tag != "symbol" or depth):
             for child in element.children:
-                self.draw(child, m, named, depth + 1)
+                self.draw(child, transform, named, depth + 1)
 
     def _is_drawn(self, element: _Element, depth: int) -> bool:
         """Whether an element can be seen. Raises PathFileError for one that would be drawn wrongly."""
@@ -195,26 +197,26 @@ class _Drawer:
             raise self._error(element, "stands inside of another <svg>")
         return True
 
-    def _draw_used(self, element: _Element, m: Matrix, named: dict[str, _Element], depth: int) -> None:
+    def _draw_used(self, element: _Element, transform: Matrix, named: dict[str, _Element], depth: int) -> None:
         """Draw the element that a <use> names; PathFileError if there is none."""
         href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
         if href[:1] != "#" or href[1:] not in named:
             raise self._error(element, f"uses '{href[:40]}', which is not in this file")
         used = named[href[1:]]
         if used.tag != "symbol":
-            self.draw(used, m, named, depth + 1)
+            self.draw(used, transform, named, depth + 1)
             return
         if "viewBox" in used.attributes:
             raise self._error(element, "uses a symbol with a viewBox")
         for child in used.children:
-            self.draw(child, m, named, depth + 1)
+            self.draw(child, transform, named, depth + 1)
 
     def _draw_stroke(self, element: _Element, stroke: list[Point]) -> None:
         """Draw a stroke of points [mm], the pen lifted on the way to where it begins."""
         self.points += len(stroke)
         if self.points > MAX_POINTS:
             raise self._error(element, f"is beyond {MAX_POINTS} points: give the drawing in parts")
-        if not all(abs(x) <= MAX_COORDINATE for p in stroke for x in p):
+        if not all(abs(x) <= MAX_COORDINATE for point in stroke for x in point):
             raise self._error(element, f"is farther away than {MAX_COORDINATE:g} mm")
         line, (x, y) = element.line, stroke[0]
         if self.position is None:
@@ -228,9 +230,9 @@ class _Drawer:
             self.pen.line((x, y, 0.0), self.options.feed, line)
         self.position, self.line = stroke[-1], line
 
-    def _move_to(self, p: tuple[float, float, float], line: int) -> None:
+    def _move_to(self, point: tuple[float, float, float], line: int) -> None:
         if self.height > 0:
-            self.pen.line(p, self.options.feed, line)
+            self.pen.line(point, self.options.feed, line)
 
     def lift(self) -> None:
         """Lift the pen where it is."""

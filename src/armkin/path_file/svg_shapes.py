@@ -80,28 +80,28 @@ def parse_transform(text: str) -> Matrix:
     return matrix
 
 
-def _one_transform(kind: str, v: list[float]) -> Matrix:
+def _one_transform(kind: str, values: list[float]) -> Matrix:
     """The matrix of one function of a transform attribute (SVG 1.1, section 7.6)."""
-    n = len(v)
-    if kind == "matrix" and n == 6:
-        return v[0], v[1], v[2], v[3], v[4], v[5]
-    if kind == "translate" and n in (1, 2):
-        return 1.0, 0.0, 0.0, 1.0, v[0], v[1] if n == 2 else 0.0
-    if kind == "scale" and n in (1, 2):
-        return v[0], 0.0, 0.0, v[-1], 0.0, 0.0
-    if kind == "rotate" and n in (1, 3):
-        c, s = math.cos(math.radians(v[0])), math.sin(math.radians(v[0]))
-        x, y = (v[1], v[2]) if n == 3 else (0.0, 0.0)
-        return c, s, -s, c, x - c * x + s * y, y - s * x - c * y
-    if kind in ("skewX", "skewY") and n == 1:
-        t = math.tan(math.radians(v[0]))
-        return (1.0, 0.0, t, 1.0, 0.0, 0.0) if kind == "skewX" else (1.0, t, 0.0, 1.0, 0.0, 0.0)
-    raise ShapeError(f"{kind} has {n} numbers")
+    count = len(values)
+    if kind == "matrix" and count == 6:
+        return values[0], values[1], values[2], values[3], values[4], values[5]
+    if kind == "translate" and count in (1, 2):
+        return 1.0, 0.0, 0.0, 1.0, values[0], values[1] if count == 2 else 0.0
+    if kind == "scale" and count in (1, 2):
+        return values[0], 0.0, 0.0, values[-1], 0.0, 0.0
+    if kind == "rotate" and count in (1, 3):
+        cosine, sine = math.cos(math.radians(values[0])), math.sin(math.radians(values[0]))
+        x, y = (values[1], values[2]) if count == 3 else (0.0, 0.0)
+        return cosine, sine, -sine, cosine, x - cosine * x + sine * y, y - sine * x - cosine * y
+    if kind in ("skewX", "skewY") and count == 1:
+        tangent = math.tan(math.radians(values[0]))
+        return (1.0, 0.0, tangent, 1.0, 0.0, 0.0) if kind == "skewX" else (1.0, tangent, 0.0, 1.0, 0.0, 0.0)
+    raise ShapeError(f"{kind} has {count} numbers")
 
 
-def outlines(tag: str, attributes: Mapping[str, str], m: Matrix) -> list[list[Point]]:
+def outlines(tag: str, attributes: Mapping[str, str], transform: Matrix) -> list[list[Point]]:
     """The strokes of one of `SHAPES`, transformed to millimetres: points."""
-    pen = _Outline(m)
+    pen = _Outline(transform)
     SHAPES[tag](pen, attributes)
     return [stroke for stroke in pen.strokes if len(stroke) > 1]
 
@@ -146,45 +146,50 @@ def _draw_round(pen: _Outline, attributes: Mapping[str, str], rx: float | None, 
 def _draw_rectangle(pen: _Outline, attributes: Mapping[str, str]) -> None:
     """A rectangle with round corners where rx or ry is above 0."""
     x, y = parse_length(attributes.get("x")), parse_length(attributes.get("y"))
-    wide, high, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
-    w, h = wide or 0.0, high or 0.0
-    if w == 0 or h == 0:
+    given_width, given_height, round_x, round_y = above_zero(attributes, "width", "height", "rx", "ry")
+    width, height = given_width or 0.0, given_height or 0.0
+    if width == 0 or height == 0:
         return
-    rx = min((round_y if round_x is None else round_x) or 0.0, w / 2)
-    ry = min((round_x if round_y is None else round_y) or 0.0, h / 2)
+    rx = min((round_y if round_x is None else round_x) or 0.0, width / 2)
+    ry = min((round_x if round_y is None else round_y) or 0.0, height / 2)
     pen.move((x + rx, y))
-    corners = ((x + w - rx, y + ry, -90), (x + w - rx, y + h - ry, 0), (x + rx, y + h - ry, 90), (x + rx, y + ry, 180))
+    corners = (
+        (x + width - rx, y + ry, -90),
+        (x + width - rx, y + height - ry, 0),
+        (x + rx, y + height - ry, 90),
+        (x + rx, y + ry, 180),
+    )
     for cx, cy, begin in corners:
-        t = math.radians(begin)
-        pen.line((cx + rx * math.cos(t), cy + ry * math.sin(t)))
+        begin_angle = math.radians(begin)
+        pen.line((cx + rx * math.cos(begin_angle), cy + ry * math.sin(begin_angle)))
         if rx > 0 and ry > 0:
-            pen.ellipse((cx, cy), rx, ry, 0.0, t, math.pi / 2)
+            pen.ellipse((cx, cy), rx, ry, 0.0, begin_angle, math.pi / 2)
     pen.close()
 
 
 class _Outline:
     """Strokes in the element's coordinates, kept transformed."""
 
-    def __init__(self, m: Matrix) -> None:
-        self.m = m
+    def __init__(self, transform: Matrix) -> None:
+        self.transform = transform
         self.strokes: list[list[Point]] = []
         self.position: Point = (0.0, 0.0)
         self.begun: Point = (0.0, 0.0)
-        self.scale = max(math.hypot(m[0], m[1]), math.hypot(m[2], m[3]), 1e-12)
+        self.scale = max(math.hypot(transform[0], transform[1]), math.hypot(transform[2], transform[3]), 1e-12)
         self.open = False
 
-    def move(self, p: Point) -> None:
-        """Lift the pen and go to p."""
-        self.position = self.begun = p
+    def move(self, point: Point) -> None:
+        """Lift the pen and go to a point."""
+        self.position = self.begun = point
         self.open = False
 
-    def line(self, p: Point) -> None:
-        """A straight line to p; a stroke begins with its first."""
+    def line(self, point: Point) -> None:
+        """A straight line to a point; a stroke begins with its first."""
         if not self.open:
             self.strokes.append([self._place(self.position)])
             self.open = True
-        self.strokes[-1].append(self._place(p))
-        self.position = p
+        self.strokes[-1].append(self._place(point))
+        self.position = point
 
     def close(self) -> None:
         """A line back to where the outline began."""
@@ -192,37 +197,37 @@ class _Outline:
             self.line(self.begun)
         self.position, self.open = self.begun, False
 
-    def bezier(self, a: Point, b: Point, p: Point) -> None:
-        """A cubic to p."""
-        s = self.position
+    def bezier(self, a: Point, b: Point, end: Point) -> None:
+        """A cubic to its end."""
+        start = self.position
         bend = max(
-            math.hypot(s[0] - 2 * a[0] + b[0], s[1] - 2 * a[1] + b[1]),
-            math.hypot(a[0] - 2 * b[0] + p[0], a[1] - 2 * b[1] + p[1]),
+            math.hypot(start[0] - 2 * a[0] + b[0], start[1] - 2 * a[1] + b[1]),
+            math.hypot(a[0] - 2 * b[0] + end[0], a[1] - 2 * b[1] + end[1]),
         )
-        n = _chord_count(math.sqrt(6 * bend * self.scale / (8 * CHORD_DISTANCE)), 12 if bend > 1e-12 else 1)
-        for k in range(1, n + 1):
-            t = k / n
+        count = _chord_count(math.sqrt(6 * bend * self.scale / (8 * CHORD_DISTANCE)), 12 if bend > 1e-12 else 1)
+        for k in range(1, count + 1):
+            t = k / count
             u = 1 - t
-            w = (u * u * u, 3 * u * u * t, 3 * u * t * t, t * t * t)
+            weights = (u * u * u, 3 * u * u * t, 3 * u * t * t, t * t * t)
             self.line((
-                w[0] * s[0] + w[1] * a[0] + w[2] * b[0] + w[3] * p[0],
-                w[0] * s[1] + w[1] * a[1] + w[2] * b[1] + w[3] * p[1],
+                weights[0] * start[0] + weights[1] * a[0] + weights[2] * b[0] + weights[3] * end[0],
+                weights[0] * start[1] + weights[1] * a[1] + weights[2] * b[1] + weights[3] * end[1],
             ))  # fmt: skip
 
-    def ellipse(self, c: Point, rx: float, ry: float, turned: float, begin: float, angle: float) -> None:
-        """An arc of an ellipse about c, its axes turned [rad], from `begin` over `angle`."""
+    def ellipse(self, centre: Point, rx: float, ry: float, tilt: float, begin: float, angle: float) -> None:
+        """An arc of an ellipse about its centre, its axes tilted [rad], from `begin` over `angle`."""
         size = max(rx, ry) * self.scale
         step = min(_CHORD_ANGLE, 2 * math.acos(1 - min(CHORD_DISTANCE / size, 1.0))) if size > 0 else _CHORD_ANGLE
-        n = _chord_count(abs(angle) / step, 1)
-        cos, sin = math.cos(turned), math.sin(turned)
-        for k in range(1, n + 1):
-            t = begin + angle * k / n
+        count = _chord_count(abs(angle) / step, 1)
+        cos, sin = math.cos(tilt), math.sin(tilt)
+        for k in range(1, count + 1):
+            t = begin + angle * k / count
             x, y = rx * math.cos(t), ry * math.sin(t)
-            self.line((c[0] + cos * x - sin * y, c[1] + sin * x + cos * y))
+            self.line((centre[0] + cos * x - sin * y, centre[1] + sin * x + cos * y))
 
-    def _place(self, p: Point) -> Point:
-        a, b, c, d, e, f = self.m
-        return a * p[0] + c * p[1] + e, b * p[0] + d * p[1] + f
+    def _place(self, point: Point) -> Point:
+        a, b, c, d, e, f = self.transform
+        return a * point[0] + c * point[1] + e, b * point[0] + d * point[1] + f
 
 
 def _chord_count(count: float, least: int) -> int:
@@ -231,52 +236,52 @@ def _chord_count(count: float, least: int) -> int:
     return max(math.ceil(count), least)
 
 
-def _draw_path(pen: _Outline, d: str) -> None:
+def _draw_path(pen: _Outline, data: str) -> None:
     """Path data: both cases of M L H V C S Q T A Z (SVG 1.1, section 8.3)."""
-    command, index, size = "", 0, len(d)
-    bent: tuple[str, Point] | None = None  # the curve before, and its last control point
+    command, index, size = "", 0, len(data)
+    last_control: tuple[str, Point] | None = None  # the curve before, and its last control point
     while True:
-        index = _skip_gap(d, index)
+        index = _skip_gap(data, index)
         if index >= size:
             return
-        if d[index].isalpha():
-            command, index = d[index], index + 1
-            begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or d.lstrip()[0] in "Mm"
+        if data[index].isalpha():
+            command, index = data[index], index + 1
+            begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or data.lstrip()[0] in "Mm"
             if command.upper() not in _COMMANDS or not begun:
                 raise ShapeError(f"path data: '{command}' is not known here; it begins with M")
             if command in "Zz":
                 pen.close()
-                bent = None
+                last_control = None
                 continue
         elif command in ("", "Z", "z"):
-            raise ShapeError(f"path data: '{d[index : index + 12]}' stands where a command must")
-        values, index = _command_values(d, index, command)
-        bent = _draw_command(pen, command, values, bent)
+            raise ShapeError(f"path data: '{data[index : index + 12]}' stands where a command must")
+        values, index = _command_values(data, index, command)
+        last_control = _draw_command(pen, command, values, last_control)
         if command in "Mm":
             command = "L" if command == "M" else "l"
 
 
-def _skip_gap(d: str, index: int) -> int:
+def _skip_gap(data: str, index: int) -> int:
     """Behind the space, and one comma, that may stand between numbers."""
-    gap = _GAP.match(d, index)
+    gap = _GAP.match(data, index)
     return index if gap is None else gap.end()
 
 
-def _command_values(d: str, index: int, command: str) -> tuple[list[float], int]:
+def _command_values(data: str, index: int, command: str) -> tuple[list[float], int]:
     """The numbers of one command from an index of the path data on, and the index behind them."""
     values: list[float] = []
     for k in range(_COMMANDS[command.upper()]):
-        index = _skip_gap(d, index)
+        index = _skip_gap(data, index)
         if command in "Aa" and k in (3, 4):  # flags need no space between them
-            if d[index : index + 1] not in ("0", "1"):
-                raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{d[index : index + 6]}'")
-            values.append(float(d[index]))
+            if data[index : index + 1] not in ("0", "1"):
+                raise ShapeError(f"path data: an arc's flag is 0 or 1, not '{data[index : index + 6]}'")
+            values.append(float(data[index]))
             index += 1
             continue
-        number = _NUMBER.match(d, index)
+        number = _NUMBER.match(data, index)
         if number is None:
             raise ShapeError(
-                f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{d[index : index + 12]}'"
+                f"path data: {command} needs {_COMMANDS[command.upper()]} numbers, not '{data[index : index + 12]}'"
             )
         values.append(_check_bound(float(number[0])))
         index = number.end()
@@ -284,59 +289,63 @@ def _command_values(d: str, index: int, command: str) -> tuple[list[float], int]
 
 
 def _draw_command(
-    pen: _Outline, command: str, v: list[float], bent: tuple[str, Point] | None
+    pen: _Outline, command: str, values: list[float], last_control: tuple[str, Point] | None
 ) -> tuple[str, Point] | None:
     """Draw one command; returns what a smooth one after it mirrors."""
     kind, (x, y) = command.upper(), pen.position
-    v = _absolute_values(command, v, pen.position)
+    values = _absolute_values(command, values, pen.position)
     if kind in "CSQT":
-        return _draw_curve(pen, kind, v, bent)
+        return _draw_curve(pen, kind, values, last_control)
     if kind == "M":
-        pen.move((v[0], v[1]))
+        pen.move((values[0], values[1]))
     elif kind == "A":
-        _draw_arc(pen, v)
+        _draw_arc(pen, values)
     else:
-        pen.line({"H": (v[0], y), "V": (x, v[0])}.get(kind) or (v[0], v[1]))
+        pen.line({"H": (values[0], y), "V": (x, values[0])}.get(kind) or (values[0], values[1]))
     return None
 
 
-def _absolute_values(command: str, v: list[float], position: Point) -> list[float]:
+def _absolute_values(command: str, values: list[float], position: Point) -> list[float]:
     """A command's numbers from the drawing's zero: small letters count from where the pen is."""
     if command.isupper():
-        return v
+        return values
     if command == "a":
-        return [*v[:5], v[5] + position[0], v[6] + position[1]]
+        return [*values[:5], values[5] + position[0], values[6] + position[1]]
     shift = {"h": position[:1], "v": position[1:]}.get(command, position)
-    return [value + shift[k % len(shift)] for k, value in enumerate(v)]
+    return [value + shift[k % len(shift)] for k, value in enumerate(values)]
 
 
-def _draw_curve(pen: _Outline, kind: str, v: list[float], bent: tuple[str, Point] | None) -> tuple[str, Point]:
-    """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before, `bent`."""
+def _draw_curve(
+    pen: _Outline, kind: str, values: list[float], last_control: tuple[str, Point] | None
+) -> tuple[str, Point]:
+    """A cubic (C, S) or quadratic (Q, T) curve; S and T mirror the last control point of a curve before."""
     curve, start = "C" if kind in "CS" else "Q", pen.position
-    first, end = (v[0], v[1]), (v[-2], v[-1])
+    first, end = (values[0], values[1]), (values[-2], values[-1])
     if kind in "ST":
-        before = bent[1] if bent is not None and bent[0] == curve else start
-        first = (2 * start[0] - before[0], 2 * start[1] - before[1])
+        mirrored = last_control[1] if last_control is not None and last_control[0] == curve else start
+        first = (2 * start[0] - mirrored[0], 2 * start[1] - mirrored[1])
     if curve == "C":
-        second = (v[-4], v[-3])
+        second = (values[-4], values[-3])
         pen.bezier(first, second, end)
         return "C", second
-    a, b = ((p[0] + 2 * (first[0] - p[0]) / 3, p[1] + 2 * (first[1] - p[1]) / 3) for p in (start, end))
+    a, b = (
+        (point[0] + 2 * (first[0] - point[0]) / 3, point[1] + 2 * (first[1] - point[1]) / 3) for point in (start, end)
+    )
     pen.bezier(a, b, end)
     return "Q", first
 
 
-def _draw_arc(pen: _Outline, v: list[float]) -> None:
+def _draw_arc(pen: _Outline, values: list[float]) -> None:
     """An elliptical arc by its ends (SVG 1.1, appendix F.6.5)."""
-    (x1, y1), (x2, y2) = pen.position, (v[5], v[6])
-    rx, ry, turned = abs(v[0]), abs(v[1]), math.radians(v[2])
-    large, sweep = v[3] == 1, v[4] == 1
+    (x1, y1), (x2, y2) = pen.position, (values[5], values[6])
+    rx, ry, tilt = abs(values[0]), abs(values[1]), math.radians(values[2])
+    large, sweep = values[3] == 1, values[4] == 1
     if (x1, y1) == (x2, y2):
         return
     if min(rx, ry) < _NO_RADIUS:
         pen.line((x2, y2))
         return
-    cos, sin = math.cos(turned), math.sin(turned)
+    cos, sin = math.cos(tilt), math.sin(tilt)
     dx, dy = (x1 - x2) / 2, (y1 - y2) / 2
     x, y = cos * dx + sin * dy, -sin * dx + cos * dy  # half the chord, along the ellipse's axes
     scale = (x / rx) ** 2 + (y / ry) ** 2
@@ -347,7 +356,7 @@ def _draw_arc(pen: _Outline, v: list[float]) -> None:
     angle = (math.atan2((-y - cy) / ry, (-x - cx) / rx) - begin) % (2 * math.pi)
     angle = angle if sweep else angle - 2 * math.pi
     centre = cos * cx - sin * cy + (x1 + x2) / 2, sin * cx + cos * cy + (y1 + y2) / 2
-    pen.ellipse(centre, rx, ry, turned, begin, angle)
+    pen.ellipse(centre, rx, ry, tilt, begin, angle)
 
 
 def _ellipse_centre(x: float, y: float, rx: float, ry: float, side: int) -> Point:

@@ -204,7 +204,7 @@ def tick_step(size: float, most: float = 7.5) -> float:
     (100.0, 200.0)
     """
     power = 10.0 ** np.floor(np.log10(size / most))
-    return float(power * next(m for m in (1, 2, 5, 10) if m * power >= size / most))
+    return float(power * next(factor for factor in (1, 2, 5, 10) if factor * power >= size / most))
 
 
 def flat_axes(figure: Any, place: Sequence[float], labels: tuple[str, str], shrink: bool = False) -> Any:

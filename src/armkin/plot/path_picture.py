@@ -152,8 +152,8 @@ def _poses_of_plan(plan: PathPlan, q: Array) -> list[_DrawnPose]:
     """The plan's first and last pose, of joint values q (N, n), and the one nearest to a singularity."""
     poses = [_DrawnPose("start", q[0], "#1f77b4", 4.5), _DrawnPose("end", q[-1], "#2ca02c", 2.0)]
     if plan.nearest_singularity is not None:  # dashed, on top: it may be the end
-        s, value, posture = plan.nearest_singularity
-        label = f"nearest to a singularity: {s:.0f} mm, condition {value:.3g}"
+        length, condition, posture = plan.nearest_singularity
+        label = f"nearest to a singularity: {length:.0f} mm, condition {condition:.3g}"
         poses.append(_DrawnPose(label, posture, _SINGULAR_COLOUR, 1.6, (0, (3, 2))))
     return poses
 

@@ -96,5 +96,5 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
             deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-apart[k]))
     if deepest:
         ordered = sorted(deepest.items(), key=lambda item: -item[1])
-        words = hits_text([{"body": body, "with": obstacle, "depth_mm": mm} for (body, obstacle), mm in ordered])
+        words = hits_text([{"body": body, "with": obstacle, "depth_mm": depth} for (body, obstacle), depth in ordered])
         output.warn(f"--ignore-keep-out: this motion {words}")

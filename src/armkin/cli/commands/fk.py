@@ -120,9 +120,9 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
     from armkin.model import rotation
 
     q = units.joints_in(arm, chunk.values)
-    F = armkin.frames(arm, q) if with_frames else None
+    frames = armkin.frames(arm, q) if with_frames else None
     fk = armkin.compile(arm).fk if compiled else partial(armkin.fk, arm)
-    T = (fk(q) if F is None or compiled else F[:, -1]) + 0.0  # no -0.0
+    T = (fk(q) if frames is None or compiled else frames[:, -1]) + 0.0  # no -0.0
     rpy = units.angles_out(rotation.rpy(T[:, :3, :3])).tolist()
     quaternion = rotation.quaternion(T[:, :3, :3]).tolist()
     violations, near = render.violations(arm, chunk.values, q), render.near_by(arm, q)
@@ -145,10 +145,10 @@ def _answers(arm: Arm, chunk: Chunk, with_frames: bool, compiled: bool) -> Itera
         }
         answer.update(in_scene)
         answer.update(near[i])
-        if F is not None:
+        if frames is not None:
             answer["frames"] = [
                 {"name": name, "position_mm": frame[:3, 3].tolist(), "rotation": frame[:3, :3].tolist()}
-                for name, frame in zip(["base", *arm.joint_names, "tool"], F[i] + 0.0, strict=True)
+                for name, frame in zip(["base", *arm.joint_names, "tool"], frames[i] + 0.0, strict=True)
             ]
         yield answer
 

@@ -49,7 +49,7 @@ def import_(
         raw = urdf_reader.read_bytes(file)  # once: a pipe can be read no second time
         imported = urdf_reader.parse_urdf(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
-        option = next((o for o in ("base", "tip") if f"the {o} must be named" in str(error)), None)
+        option = next((end for end in ("base", "tip") if f"the {end} must be named" in str(error)), None)
         if option is None:
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None

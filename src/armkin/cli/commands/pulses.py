@@ -122,7 +122,9 @@ class _Row(NamedTuple):
             "error_mm": self.error_mm,
             "within_limits": not self.violations,
             "violations": self.violations,
-            "outside_travel": [m for m, beyond in zip(of_all["motors"], self.beyond_travel, strict=True) if beyond],
+            "outside_travel": [
+                motor for motor, beyond in zip(of_all["motors"], self.beyond_travel, strict=True) if beyond
+            ],
         }
         return cast("Pulses", answer)
 
@@ -134,7 +136,7 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     q = units.joints_in(arm, chunk.values)
     best_vectors = armkin.best_pulses(arm, q) if best else None
     rounded = armkin.rounding(arm, q) if best_vectors is None else best_vectors.rounded
-    r = rounded if best_vectors is None else best_vectors.chosen
+    rounding = rounded if best_vectors is None else best_vectors.chosen
     head = render.head(arm)
     of_all = {
         "robot": head["robot"],
@@ -147,10 +149,10 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
         "from": origin,
     }
     # Columns of the whole chunk, then plain Python: numpy is slow at single numbers.
-    moves = r.pulses - armkin.pulses(arm, units.joints_in(arm, origin))
-    tips = r.theoretical + 0.0, r.actual + 0.0, r.difference
-    columns = chunk.values, r.pulses, moves, units.joints_out(arm, r.actual_joints), *tips, r.error
-    violations, beyond_travel = render.violations(arm, chunk.values, q), outside_travel(arm, r.pulses).tolist()
+    moves = rounding.pulses - armkin.pulses(arm, units.joints_in(arm, origin))
+    tips = rounding.theoretical + 0.0, rounding.actual + 0.0, rounding.difference
+    columns = chunk.values, rounding.pulses, moves, units.joints_out(arm, rounding.actual_joints), *tips, rounding.error
+    violations, beyond_travel = render.violations(arm, chunk.values, q), outside_travel(arm, rounding.pulses).tolist()
     rows = map(_Row, *(column.tolist() for column in columns), violations, beyond_travel)
     beside_best = repeat({}) if best_vectors is None else _rounded_keys(best_vectors)
     in_scene = render.scene_and_tool(arm)
@@ -185,7 +187,7 @@ def _text(arm: Arm, answer: Pulses) -> str:
         answer["joint_units"],
         strict=True,
     ):
-        joints.append([name, *(fixed_text(v, 6) for v in (target, actual, abs(actual - target), step)), unit])
+        joints.append([name, *(fixed_text(value, 6) for value in (target, actual, abs(actual - target), step)), unit])
     tip = [["tip", "exact", "actual", "difference", ""]]
     position = answer["position_mm"]
     for i, axis in enumerate("xyz"):

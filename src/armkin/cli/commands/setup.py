@@ -60,7 +60,8 @@ def _differences_text(differences: list[dict[str, Any]] | None) -> str:
     if not differences:
         return "# Klipper's settings fit the robot file; pins are not compared\n"
     rows = (
-        f"# {d['setting']} is {d['found'] or 'not there'}: the robot file wants {d['wanted']}\n" for d in differences
+        f"# {entry['setting']} is {entry['found'] or 'not there'}: the robot file wants {entry['wanted']}\n"
+        for entry in differences
     )
     return "".join(rows)
 
@@ -69,8 +70,9 @@ def _text(differences: list[dict[str, Any]], written: bool) -> str:
     if not differences:
         return "the settings fit the robot file\n"
     rows = [["setting", "what", "board", "robot file", ""]]
-    for d in differences:
-        board_value = "-" if d["found"] is None else f"{d['found']:g}"
-        rows.append([f"${d['setting']}", d["what"], board_value, f"{d['wanted']:g}", "" if d["serious"] else "no harm"])
+    for entry in differences:
+        board_value = "-" if entry["found"] is None else f"{entry['found']:g}"
+        effect = "" if entry["serious"] else "no harm"
+        rows.append([f"${entry['setting']}", entry["what"], board_value, f"{entry['wanted']:g}", effect])
     end = "written, and read back" if written else "--write writes them; the arm's position is lost with that"
     return f"{render.table(rows, left_aligned=(0, 1, 4))}\n{end}\n"

@@ -194,15 +194,15 @@ def _answer_pose(answer: dict[str, Any]) -> Pose:
         branch = branches[best]
         return Pose(_checked_numbers(branch.get("joints") if isinstance(branch, dict) else None), None)
     pulses = answer.get("pulses")
-    if pulses is not None and not (isinstance(pulses, list) and all(type(p) is int for p in pulses)):
+    if pulses is not None and not (isinstance(pulses, list) and all(type(pulse) is int for pulse in pulses)):
         raise UsageError("the answer on standard input is damaged: its pulses are not whole numbers")
     return Pose(_checked_numbers(answer.get("joints")), pulses)
 
 
 def _checked_numbers(values: Any) -> list[float]:
-    if not isinstance(values, list) or not values or not all(type(v) in (int, float) for v in values):
+    if not isinstance(values, list) or not values or not all(type(number) in (int, float) for number in values):
         raise UsageError("the answer on standard input has no joints to send")
     try:
-        return [float(v) for v in values]
+        return [float(number) for number in values]
     except OverflowError:
         raise UsageError("joint values must be finite to be sent") from None

@@ -65,10 +65,14 @@ def note_target(arm: Arm, labels: Sequence[str], values: Sequence[float]) -> Non
     position = [value for label, value in zip(labels, values, strict=True) if label in "xyz"]
     is_tiny = bool(position) and max(map(abs, position)) < _TINY_REACH
     if is_tiny and any(map(_has_digits, position)) and arm.reach > _BIG_REACH:
-        output.note(f"targets are millimetres, and this looks like metres ({', '.join(f'{v:g}' for v in position)})")
-    angles = [v for v, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
+        output.note(
+            f"targets are millimetres, and this looks like metres ({', '.join(f'{number:g}' for number in position)})"
+        )
+    angles = [number for number, unit in zip(values, label_units(labels), strict=True) if unit == "deg"]
     if any(map(_has_digits, angles)) and any(map(_is_turn, angles)):
-        output.note(f"angles are degrees, and these look like radians ({', '.join(f'{v:g}' for v in angles)})")
+        output.note(
+            f"angles are degrees, and these look like radians ({', '.join(f'{number:g}' for number in angles)})"
+        )
 
 
 def _has_digits(value: float) -> bool:

@@ -166,7 +166,7 @@ def _print_line(text: str) -> None:
 
 def _printable_text(line: str, max_length: int) -> str:
     """Without control characters, which a terminal would obey, and not longer than people read."""
-    text = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in line)
+    text = "".join(char if char.isprintable() else char.encode("unicode_escape").decode() for char in line)
     return text if len(text) <= max_length else f"{text[: max_length - 90]} ... {text[-80:]}"
 
 

@@ -47,7 +47,7 @@ def near_by(arm: Arm, q: Array) -> list[Any]:
         return [{}] * len(q)
     from armkin.keep_out.clearance import hits
 
-    return [{"clearance_mm": mm, "hits": hit} for mm, hit in hits(arm, q)]
+    return [{"clearance_mm": distance, "hits": hit} for distance, hit in hits(arm, q)]
 
 
 def hits_in_words(answer: Mapping[str, Any]) -> str:
