@@ -269,16 +269,16 @@ def _matrix_entries(P: Pose) -> list[Entry]:
 
 def point_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's position, computed from the tool to the base, as transforming a point costs less than a pose."""
-    p: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
+    point: list[Entry] = [float(x) for x in arm.link[-1][:3, 3]]
     for joint in reversed(range(arm.n)):
         if arm.prismatic[joint]:
-            p = [p[0], p[1], arrays.add(p[2], _actual_slide(arm, joint, q[joint]))]
+            point = [point[0], point[1], arrays.add(point[2], _actual_slide(arm, joint, q[joint]))]
         else:
             c, s = _actual_cos_sin(arm, joint, q[joint])
-            x, y, z = p
-            p = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
-        p = pose.apply(pose.constant(arm.link[joint]), p)
-    return p
+            x, y, z = point
+            point = [arrays.sub(arrays.mul(c, x), arrays.mul(s, y)), arrays.add(arrays.mul(s, x), arrays.mul(c, y)), z]
+        point = pose.apply(pose.constant(arm.link[joint]), point)
+    return point
 
 
 def _single_pose(arm: Arm, q: Array) -> Array:

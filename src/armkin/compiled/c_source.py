@@ -138,8 +138,8 @@ def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[s
         "coarse": number_text(COARSE_ROOM * arm.reach),
         "close": ", ".join(number_text(STANDING_DISTANCE * unit) for unit in radian_or_reach(arm).tolist()),
         "slides": ", ".join(str(int(slides)) for slides in arm.prismatic.tolist()),
-        "lowest": ", ".join(number_text(v - SLACK) for v in arm.lower.tolist()),
-        "highest": ", ".join(number_text(v + SLACK) for v in arm.upper.tolist()),
+        "lowest": ", ".join(number_text(limit - SLACK) for limit in arm.lower.tolist()),
+        "highest": ", ".join(number_text(limit + SLACK) for limit in arm.upper.tolist()),
         "position": str(task.position),
         "first": str(9 if task.orientation == "full" else 0),
         "farthest": number_text(_farthest_coordinate(arm)),
@@ -177,7 +177,9 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     sides = local_structure.BOTH_WAYS, local_structure.ONE_WAY
     tables |= {"nodes": np.stack([side.node for side in sides]), "fit": np.stack([side.to_powers for side in sides])}
     tables["gains"] = np.array([side.gain for side in sides])
-    fields |= {name: ", ".join(number_text(float(v)) for v in table.ravel()) for name, table in tables.items()}
+    fields |= {
+        name: ", ".join(number_text(float(number)) for number in table.ravel()) for name, table in tables.items()
+    }
     fields |= {
         "nodes_count": str(local_structure.NODES),
         "links": str(chains.LINKS),

@@ -162,8 +162,8 @@ def _common_normal(link: Array) -> _Normal:
         d = float(p[2] - d_after * z[2])
     c, s = math.cos(theta), math.sin(theta)
     ca, sa = math.cos(alpha), math.sin(alpha)
-    turned = np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0, sa, ca]]).T @ link[:3, :3]
-    return _Normal(theta, d, a, alpha, math.atan2(turned[1, 0], turned[0, 0]), d_after)
+    frame = np.array([[c, -s * ca, s * sa], [s, c * ca, -c * sa], [0, sa, ca]]).T @ link[:3, :3]
+    return _Normal(theta, d, a, alpha, math.atan2(frame[1, 0], frame[0, 0]), d_after)
 
 
 def _is_forward(theta: float) -> bool:
@@ -188,7 +188,9 @@ def _file_keys(
     order = ("name", "type")
     file_keys |= keys | {
         "joints": [
-            {k: joint[k] for k in order if k in joint} | row | {k: v for k, v in joint.items() if k not in order}
+            {name: joint[name] for name in order if name in joint}
+            | row
+            | {name: value for name, value in joint.items() if name not in order}
             for joint, row in zip(joints, rows, strict=True)
         ]
     }

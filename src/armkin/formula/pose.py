@@ -65,7 +65,7 @@ def turn_back(P: Pose, v: Sequence[Entry]) -> list[Entry]:
 def inverse(P: Pose) -> Pose:
     """The inverse of a rigid transform."""
     t = turn_back(P, P[9:12])
-    return [P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8], *(mul(-1.0, e) for e in t)]
+    return [P[0], P[3], P[6], P[1], P[4], P[7], P[2], P[5], P[8], *(mul(-1.0, entry) for entry in t)]
 
 
 def write_pose(P: Pose, matrices: Array) -> None:

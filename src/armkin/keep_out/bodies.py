@@ -65,7 +65,7 @@ def bodies(arm: Arm) -> Bodies:
     radii = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
     assumed = np.isnan(radii)
     owner, begin, end, slide = zip(
-        *_base_segments(arm), *(s for i in range(arm.n) for s in _link_segments(arm, i)), strict=True
+        *_base_segments(arm), *(segment for i in range(arm.n) for segment in _link_segments(arm, i)), strict=True
     )
     return Bodies(
         names=(BASE, *arm.joint_names),
@@ -83,7 +83,9 @@ def _base_segments(arm: Arm) -> list[_Segment]:
     skeleton, min_length = arm_shape(arm), 1e-9 * arm.reach
     fixed_segments = list(_segments_between(skeleton.bodies[0], min_length))
     if not arm.prismatic[0]:
-        axis_segments = [s for s in _segments_between(skeleton.bodies[1], min_length) if _on_axis(s, min_length)]
+        axis_segments = [
+            segment for segment in _segments_between(skeleton.bodies[1], min_length) if _on_axis(segment, min_length)
+        ]
         fixed_segments += [(_place_point(arm.link[0], a), _place_point(arm.link[0], b)) for a, b in axis_segments]
     return [(0, a, b, False) for a, b in fixed_segments or [(skeleton.bodies[0][-1],) * 2]]
 
@@ -95,7 +97,7 @@ def _link_segments(arm: Arm, joint: int) -> list[_Segment]:
     if arm.prismatic[joint]:
         return [(joint + 1, corners[0], corners[0], True), *((joint + 1, a, b, False) for a, b in segments)]
     if joint == 0:
-        segments = [s for s in segments if not _on_axis(s, min_length)]
+        segments = [segment for segment in segments if not _on_axis(segment, min_length)]
     elif not segments:
         segments = [(corners[-1], corners[-1])]  # a body without length is a sphere
     return [(joint + 1, a, b, False) for a, b in segments]

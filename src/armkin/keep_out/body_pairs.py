@@ -50,10 +50,10 @@ class Guard:
 
     def distances(self, q: Array) -> Array:
         """Signed distance of every pair, without subtracting `clearance`: q (N, n) [rad | mm] -> (N, pairs) [mm]."""
-        mm = np.empty((len(q), len(self.pairs)))
+        distances = np.empty((len(q), len(self.pairs)))
         for start in range(0, len(q), CHUNK):
-            mm[start : start + CHUNK] = self._distances(q[start : start + CHUNK]).T
-        return mm
+            distances[start : start + CHUNK] = self._distances(q[start : start + CHUNK]).T
+        return distances
 
     def _distances(self, q: Array) -> Array:
         """Signed distances (pairs, N) [mm]."""
@@ -79,12 +79,13 @@ class Guard:
 
     def least_clearances(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least clearance and its pair: q (N, n) -> (N,), (N,); nan for joint values of nan, inf without pairs."""
-        mm, pairs = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
+        clearances, pairs = np.full(len(q), np.inf), np.zeros(len(q), np.intp)
         for start in range(0, len(q) if self.pairs else 0, CHUNK):
-            mm[start : start + CHUNK], pairs[start : start + CHUNK] = self._least_distances(q[start : start + CHUNK])
-        mm -= self.arm.clearance
-        mm[np.isnan(q).any(axis=1)] = np.nan
-        return mm, pairs
+            chunk = slice(start, start + CHUNK)
+            clearances[chunk], pairs[chunk] = self._least_distances(q[chunk])
+        clearances -= self.arm.clearance
+        clearances[np.isnan(q).any(axis=1)] = np.nan
+        return clearances, pairs
 
     def _least_distances(self, q: Array) -> tuple[Array, NDArray[np.intp]]:
         """Least distance and its pair.

@@ -62,8 +62,8 @@ def clearance(arm: Arm, q: ArrayLike) -> Clearance:
         no_name = np.full(batch_shape, "", dtype="<U1")
         return Clearance(np.where(np.isnan(values).any(axis=-1), np.nan, np.inf)[()], no_name[()], no_name[()])
     arm_guard = _guard(full_arm)
-    mm, pairs = arm_guard.least_clearances(full_q)
-    return name_clearances(full_arm, mm, pairs, batch_shape)
+    least_clearances, pairs = arm_guard.least_clearances(full_q)
+    return name_clearances(full_arm, least_clearances, pairs, batch_shape)
 
 
 def name_clearances(arm: Arm, mm: Array, pairs: NDArray[np.intp], lead: tuple[int, ...]) -> Clearance:

@@ -141,20 +141,20 @@ def actual_arm(arm: Arm) -> Arm:
 
     An arm whose ratios are all 1 is returned as it is.
     """
-    r = arm.ratio
-    if (r == 1.0).all():
+    ratio = arm.ratio
+    if (ratio == 1.0).all():
         return arm
     return replace(
         arm,
-        lower=freeze(arm.lower * r),
-        upper=freeze(arm.upper * r),
-        home=freeze(arm.home * r),
-        pose_joints=freeze(arm.pose_joints * r),
-        max_speed=freeze(arm.max_speed * r),
-        max_accel=freeze(arm.max_accel * r),
-        max_jerk=freeze(arm.max_jerk * r),
+        lower=freeze(arm.lower * ratio),
+        upper=freeze(arm.upper * ratio),
+        home=freeze(arm.home * ratio),
+        pose_joints=freeze(arm.pose_joints * ratio),
+        max_speed=freeze(arm.max_speed * ratio),
+        max_accel=freeze(arm.max_accel * ratio),
+        max_jerk=freeze(arm.max_jerk * ratio),
         ratio=freeze(np.ones(arm.n)),
-        motor_gain=freeze(arm.motor_gain / r),
+        motor_gain=freeze(arm.motor_gain / ratio),
     )
 
 

@@ -156,11 +156,12 @@ def _dh_factors(joint: Joint, *, modified: bool) -> _JointFactors:
 def _screw_factors(joint: Joint) -> _JointFactors:
     """The factors of exp([S] q) = B Z(q) B^-1, B's z axis on the screw axis (Lynch & Park, Modern Robotics, 3.3.2)."""
     assert joint.screw is not None
-    w, v = (np.array(part, dtype=float) for part in joint.twist())
+    axis, moment = (np.array(part, dtype=float) for part in joint.twist())
     if joint.type == "prismatic":
-        direction, point = v, np.zeros(3)
+        direction, point = moment, np.zeros(3)
     else:
-        direction, point = w, np.cross(w, v) if joint.screw.q is None else np.array(joint.screw.q, dtype=float)
+        direction = axis
+        point = np.cross(axis, moment) if joint.screw.q is None else np.array(joint.screw.q, dtype=float)
     B = np.eye(4)
     B[:3, 2] = direction
     B[:3, 0] = _perpendicular(direction)

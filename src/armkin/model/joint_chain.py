@@ -40,6 +40,6 @@ def joint_axes(chain: Chain) -> tuple[Array, Array]:
     return np.array(points), np.array(directions)
 
 
-def is_parallel(L: Array, tolerance: float) -> bool:
+def is_parallel(link: Array, tolerance: float) -> bool:
     """Whether the joint axes on both sides of a link are parallel (or antiparallel)."""
-    return bool(np.hypot(L[0, 2], L[1, 2]) <= tolerance)
+    return bool(np.hypot(link[0, 2], link[1, 2]) <= tolerance)

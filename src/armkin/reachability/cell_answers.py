@@ -73,8 +73,9 @@ class CellQuestion:
     @property
     def solves_a_ring(self) -> int:
         """Number of solves for a ring."""
-        g = self.grid
-        return (1 if self.by_arcs else g.azimuths) * g.directions_count * (1 if self.roll_arcs else g.rolls_count)
+        grid = self.grid
+        azimuths, rolls = 1 if self.by_arcs else grid.azimuths, 1 if self.roll_arcs else grid.rolls_count
+        return azimuths * grid.directions_count * rolls
 
     @cached_property
     def roll_words(self) -> Words:
@@ -98,10 +99,10 @@ def cell_columns(question: CellQuestion, rings: Array) -> dict[str, Array]:
         solve_rings = np.repeat(rings, M * count, axis=0)
         azimuth = np.tile(np.repeat(np.arange(M) * (TURN / M), count), len(rings))
     orientation = np.arange(len(solve_rings)) % count
-    L = 1 if question.roll_arcs else grid.rolls_count
-    roll = np.asarray((orientation % L) * (TURN / grid.rolls_count), dtype=float)
-    target = grid.targets(solve_rings, azimuth, orientation // L, roll)
-    columns = _Answers(question, target, solve_rings, orientation // L).columns(count)
+    rolls = 1 if question.roll_arcs else grid.rolls_count
+    roll = np.asarray((orientation % rolls) * (TURN / grid.rolls_count), dtype=float)
+    target = grid.targets(solve_rings, azimuth, orientation // rolls, roll)
+    columns = _Answers(question, target, solve_rings, orientation // rolls).columns(count)
     cells = len(rings) * M
     return {name: values.reshape(cells) for name, values in columns.items()}
 
@@ -219,13 +220,13 @@ class _Answers:
 
     def _all_solutions(self, row: int) -> Solutions:
         """Solutions of all poses that one solve stands for, azimuth by azimuth."""
-        M, L = self.grid.azimuths, self.count
-        azimuth, turn = np.divmod(np.arange(M * L), L)
-        rows = np.full(M * L, row)
-        roll = turn * (TURN / L)
+        M, turns = self.grid.azimuths, self.count
+        azimuth, turn = np.divmod(np.arange(M * turns), turns)
+        rows = np.full(M * turns, row)
+        roll = turn * (TURN / turns)
         if not self.question.roll_arcs and self.grid.rolls_count > 1:
             roll = np.full(
-                M * L, (row % self.question.solves_a_ring % self.grid.rolls_count) * (TURN / self.grid.rolls_count)
+                M * turns, (row % self.question.solves_a_ring % self.grid.rolls_count) * (TURN / self.grid.rolls_count)
             )
         return ik(self.arm, self.grid.targets(self.azimuth[rows], azimuth * (TURN / M), self.direction[rows], roll))
 
@@ -326,9 +327,9 @@ def _all_arcs(count: int) -> Bool:
 
 def pack_bits(bits: Bool) -> Words:
     """Flags (..., L) as words of 64 bits: (..., W)."""
-    L = bits.shape[-1]
-    padded = np.zeros((*bits.shape[:-1], -(-L // 64) * 64), bool)
-    padded[..., :L] = bits
+    length = bits.shape[-1]
+    padded = np.zeros((*bits.shape[:-1], -(-length // 64) * 64), bool)
+    padded[..., :length] = bits
     packed = np.packbits(padded, axis=-1, bitorder="little")
     return packed.view("<u8").astype(np.uint64)
 

@@ -71,17 +71,17 @@ class Grid:
     @cached_property
     def frame(self) -> Array:
         """The reach frame in the frame of targets: (4, 4)."""
-        F = np.eye(4)
-        F[:3, 3] = self.arm.link[0][:3, 3]
+        frame = np.eye(4)
+        frame[:3, 3] = self.arm.link[0][:3, 3]
         z = self.arm.base[:3, 2] if self.arm.prismatic[0] else self.arm.link[0][:3, 2]
         x = self.arm.base[:3, 0]
         if np.linalg.norm(np.cross(x, z)) < STRAIGHT:
             x = self.arm.base[:3, 1]
         x = x - (x @ z) * z
-        F[:3, 0] = x / np.linalg.norm(x)
-        F[:3, 2] = z
-        F[:3, 1] = np.cross(z, F[:3, 0])
-        return F
+        frame[:3, 0] = x / np.linalg.norm(x)
+        frame[:3, 2] = z
+        frame[:3, 1] = np.cross(z, frame[:3, 0])
+        return frame
 
     @cached_property
     def rings(self) -> Array:
@@ -119,8 +119,8 @@ class Grid:
             return np.array([[0.0, 0.0, -1.0 if self.frame[2, 2] > 0 or self.down_is_apart else 1.0]])
         n = np.arange(self.directions)
         z = 1.0 - (2.0 * n + 1.0) / self.directions
-        r, angle = np.sqrt(1.0 - z * z), n * GOLDEN
-        return np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+        radius, angle = np.sqrt(1.0 - z * z), n * GOLDEN
+        return np.stack([radius * np.cos(angle), radius * np.sin(angle), z], axis=1)
 
     @cached_property
     def angles(self) -> Array:
@@ -131,19 +131,19 @@ class Grid:
 
     def positions(self, rings: Array, azimuth: Array) -> Array:
         """Centres of cells in the frame of targets: rings (..., 2), azimuth (...) [rad] -> (..., 3)."""
-        r, z = (rings[..., 0] + 0.5) * self.step, rings[..., 1] * self.step
-        local = np.stack([r * np.cos(azimuth), r * np.sin(azimuth), z + 0.0 * azimuth], axis=-1)
+        radius, z = (rings[..., 0] + 0.5) * self.step, rings[..., 1] * self.step
+        local = np.stack([radius * np.cos(azimuth), radius * np.sin(azimuth), z + 0.0 * azimuth], axis=-1)
         return np.asarray(self.frame[:3, 3] + local @ self.frame[:3, :3].T)
 
     def targets(self, rings: Array, azimuth: Array, direction: NDArray[np.intp], roll: Array) -> Array:
         """Targets of `ik`: rings (S, 2), azimuth, roll (S,) [rad], direction (S,) index -> (S, ...)."""
-        p = self.positions(rings, azimuth)
+        positions = self.positions(rings, azimuth)
         if self.task.orientation == "full":
-            T = np.zeros((len(p), 4, 4))
+            T = np.zeros((len(positions), 4, 4))
             T[:, :3, :3] = self._cell_frames(azimuth) @ self._shortest_rotations[direction] @ rotation_about(2, roll)
-            T[:, :3, 3], T[:, 3, 3] = p, 1.0
+            T[:, :3, 3], T[:, 3, 3] = positions, 1.0
             return T
-        parts = [p[:, : self.task.position]]
+        parts = [positions[:, : self.task.position]]
         if self.task.orientation == "axis":
             parts.append(np.einsum("sij,sj->si", self._cell_frames(azimuth), self.vectors[direction]))
         elif self.task.name in ("xy_theta", "xyz_yaw"):

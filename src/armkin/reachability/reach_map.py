@@ -189,8 +189,8 @@ def answer_chunk(question: CellQuestion, chunk: RingChunk) -> tuple[int, Table]:
     parts = [cell_columns(question, chunk.rings[i : i + rings_each]) for i in range(0, len(chunk.rings), rings_each)]
     cells = len(chunk.rings) * M
     ring = np.repeat(chunk.rings, M, axis=0)
-    p = grid.positions(ring, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
-    table: Table = {f"{name}_mm": np.ascontiguousarray(p[:, i]) + 0.0 for i, name in enumerate("xyz")}
+    positions = grid.positions(ring, np.tile(np.arange(M) * (TURN / M), len(chunk.rings)))
+    table: Table = {f"{name}_mm": np.ascontiguousarray(positions[:, i]) + 0.0 for i, name in enumerate("xyz")}
     for name in [name for name in UNITS if name not in table]:
         table[name] = np.concatenate([part[name] for part in parts]) if name in parts[0] else np.full(cells, np.nan)
     return chunk.number, table
@@ -234,8 +234,8 @@ class _Run:
     def _count(self, chunk: RingChunk, table: Table) -> None:
         grid = self.question.grid
         reached = np.asarray(table["share"]) > 0
-        r = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
-        self.volume += float(r[reached].sum()) * grid.step**2 * TURN / grid.azimuths
+        radius = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
+        self.volume += float(radius[reached].sum()) * grid.step**2 * TURN / grid.azimuths
         self.reached += int(reached.sum())
         self.solves += len(chunk.rings) * self.question.solves_a_ring
         self.cells += len(reached)

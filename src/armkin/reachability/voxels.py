@@ -30,9 +30,9 @@ class Layer(NamedTuple):
 
     def table(self, column: Array) -> Array:
         """A column of the cells as an image (rows upwards, columns to the right); nan without a cell."""
-        across, up = (self.places - self.places.min(axis=0)).T
-        image = np.full((up.max() + 1, across.max() + 1), np.nan)
-        image[up, across] = column[self.row]
+        image_column, image_row = (self.places - self.places.min(axis=0)).T
+        image = np.full((image_row.max() + 1, image_column.max() + 1), np.nan)
+        image[image_row, image_column] = column[self.row]
         return image
 
 

@@ -114,7 +114,7 @@ def _gripper_json(arm: Arm) -> dict[str, Any] | None:
         return None
     # The gripper continues the last straight piece of the arm, which is not always along the tool's z axis.
     corners = arm_shape(arm).bodies[-1]
-    pieces = [d for d in np.diff(corners, axis=0) if np.linalg.norm(d) > 1e-6 * arm.reach]
+    pieces = [step for step in np.diff(corners, axis=0) if np.linalg.norm(step) > 1e-6 * arm.reach]
     piece = pieces[-1] if pieces else np.array([0.0, 0.0, 1.0])
     direction = arm.link[-1][:3, :3].T @ piece
     return {

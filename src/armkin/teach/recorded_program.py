@@ -204,13 +204,13 @@ class Program:
 
     def _rename(self, fields: Mapping[str, Any]) -> None:
         name = request_checks.text_field(fields, "name", 60)  # a YAML comment may only have printable characters
-        printable = "".join(c if c.isprintable() else " " for c in name.replace("#", ""))
+        printable = "".join(char if char.isprintable() else " " for char in name.replace("#", ""))
         self.names[self._move_index(fields)] = " ".join(printable.split())
 
     def _reorder(self, fields: Mapping[str, Any]) -> None:
-        index, to = self._move_index(fields), request_checks.index_field(fields, "to", len(self.moves))
-        self.moves.insert(to, self.moves.pop(index))
-        self.names.insert(to, self.names.pop(index))
+        index, new_index = self._move_index(fields), request_checks.index_field(fields, "to", len(self.moves))
+        self.moves.insert(new_index, self.moves.pop(index))
+        self.names.insert(new_index, self.names.pop(index))
 
     def _delete(self, fields: Mapping[str, Any]) -> None:
         index = self._move_index(fields)

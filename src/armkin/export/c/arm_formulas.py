@@ -58,7 +58,7 @@ def record_target(arm: Arm, task: Task) -> recording.Recording:
             return T
         goal = [T[4 * k + 3] for k in range(task.position)]
         for row, offset in zip(task.sums * arm.ratio, task.offsets, strict=True):
-            goal.append(arrays.add(arrays.dot([float(v) for v in row], q), float(offset)))
+            goal.append(arrays.add(arrays.dot([float(weight) for weight in row], q), float(offset)))
         return goal + ([T[2], T[6], T[10]] if task.orientation == "axis" else [])
 
     return recording.record(formula, arm.n)

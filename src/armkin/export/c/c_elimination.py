@@ -129,14 +129,14 @@ def _pencil_code(number: int, pencil: Pencil) -> str:
     """The arrays of a pencil, and the macro that initialises its struct."""
     slot, ends, arrays = pencil.role.slot, pencil.ends, pencil_arrays(pencil)
     texts = [_array_code(f"{name}_{number}", values) for name, values in arrays.items() if values is not None]
-    r, w = pencil.K_re.shape[1], pencil.W.shape[1]
     role = pencil.role
-    numbers = (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), 15 - ends.rank, r, w, pencil.size)
+    sizes = (15 - ends.rank, pencil.K_re.shape[1], pencil.W.shape[1], pencil.size)
+    numbers = (slot, int(role.backward), role.hidden, role.dialytic, int(role.wide), *sizes)
     fields = [
         c_and_js_code.number_text(float(pencil.psi)),
         *map(str, numbers),
         f"{{{', '.join(map(str, role.order))}}}",
-        f"{{{', '.join(str(int(p)) for p in pencil.prismatic)}}}",
+        f"{{{', '.join(str(int(flag)) for flag in pencil.prismatic)}}}",
         *(f"arm_{name}_{number}" if values is not None else "0" for name, values in arrays.items()),
     ]
     return "\n".join([*texts, f"#define ARM_PENCIL_{number} {{{', '.join(fields)}}}", ""])
@@ -164,11 +164,11 @@ def _with_held_joint(arm: Arm, held: Redundancy) -> str:
 
 
 def _array_code(name: str, values: ArrayLike) -> str:
-    flat = [c_and_js_code.number_text(float(v)) for v in np.asarray(values, dtype=float).ravel()]
+    flat = [c_and_js_code.number_text(float(value)) for value in np.asarray(values, dtype=float).ravel()]
     rows = [", ".join(flat[k : k + 5]) for k in range(0, len(flat), 5)]
     return f"static const double arm_{name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};"
 
 
 def _flags_code(name: str, values: Iterable[int]) -> str:
-    numbers = [str(int(v)) for v in values]
+    numbers = [str(int(flag)) for flag in values]
     return f"static const unsigned char arm_{name}[{len(numbers)}] = {{{', '.join(numbers)}}};"

@@ -90,7 +90,7 @@ def _fields(arm: Arm, task: Task, geometry: Geometry, branches: int, single: boo
         "lower": _number_list(actual.lower, single),
         "upper": _number_list(actual.upper, single),
         **_ratio_lines(arm, single),
-        "slides": ", ".join(str(int(p)) for p in arm.prismatic),
+        "slides": ", ".join(str(int(slides)) for slides in arm.prismatic),
     }
 
 
@@ -254,7 +254,7 @@ def _orientation_lines(arm: Arm, task: Task, single: bool) -> str:
     if task.orientation == "axis":
         lines = ["for (i = 0; i < 3; i++) {", "    off = T[4 * i + 2] - goal[3 + i];", "    sum += off * off;", "}"]
     for k, (row, offset) in enumerate(zip(task.sums, task.offsets, strict=True), task.position):
-        terms = [f"{number_text(float(v), single)} * q[{j}]" for j, v in enumerate(row * arm.ratio) if v]
+        terms = [f"{number_text(float(weight), single)} * q[{j}]" for j, weight in enumerate(row * arm.ratio) if weight]
         lines += [
             f"off = {' + '.join([*terms, number_text(float(offset), single)])} - goal[{k}];",
             "off -= ARM_TURN * ARM_RINT(off / ARM_TURN);",
@@ -264,7 +264,7 @@ def _orientation_lines(arm: Arm, task: Task, single: bool) -> str:
 
 
 def _number_list(values: Array, single: bool) -> str:
-    return ", ".join(number_text(float(v), single) for v in values)
+    return ", ".join(number_text(float(value), single) for value in values)
 
 
 def _about_text(arm: Arm, task: Task, geometry: Geometry, single: bool) -> str:

@@ -102,4 +102,4 @@ def _table_text(values: Array, single: bool) -> str:
 
 def _row_text(values: Array, single: bool) -> str:
     """Numbers (k,) as C99, between commas."""
-    return ", ".join(number_text(float(v), single) for v in values)
+    return ", ".join(number_text(float(value), single) for value in values)

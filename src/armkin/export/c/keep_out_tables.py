@@ -57,7 +57,7 @@ def clearances_code(arm: Arm, single: bool = False) -> str:
     tables = pair_tables(arm)
 
     def initialiser(values: Iterable[float]) -> str:
-        return ", ".join(number_text(float(v), single) for v in values)
+        return ", ".join(number_text(float(value), single) for value in values)
 
     rows = [initialiser([*values, *[0.0] * (_NUMBERS - len(values))]) for _, values in tables.shapes]
     crossings = [f"{{{i}, {j}, {k}}}" for i, j, k in tables.crossings]

@@ -178,7 +178,8 @@ def _kinematics(turned: Arm, task: Task) -> list[str]:
 
 def _exported_lines(arm: Arm, task: Task) -> list[str]:
     """The exported constants: names, limits, home, labels."""
-    limits = [[None if np.isinf(v) else v for v in row] for row in np.stack([arm.lower, arm.upper], axis=1).tolist()]
+    ranges = np.stack([arm.lower, arm.upper], axis=1).tolist()
+    limits = [[None if np.isinf(limit) else limit for limit in joint_range] for joint_range in ranges]
     return [
         "/** The joints. */",
         f"export const names = {_js_text(arm.joint_names)};",

@@ -89,7 +89,7 @@ def _pencil_code(pencil: Pencil) -> str:
 
 def _array_code(values: ArrayLike) -> str:
     flat = np.asarray(values, dtype=float).ravel().tolist()
-    return f"Float64Array.of({', '.join(str(int(v)) if v == int(v) else repr(v) for v in flat)})"
+    return f"Float64Array.of({', '.join(str(int(value)) if value == int(value) else repr(value) for value in flat)})"
 
 
 def _arrays_code(rows: list[np.ndarray]) -> str:
@@ -97,4 +97,4 @@ def _arrays_code(rows: list[np.ndarray]) -> str:
 
 
 def _flags_code(values: ArrayLike) -> str:
-    return f"[{', '.join('true' if v else 'false' for v in np.asarray(values).ravel())}]"
+    return f"[{', '.join('true' if flag else 'false' for flag in np.asarray(values).ravel())}]"

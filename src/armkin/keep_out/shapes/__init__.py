@@ -24,7 +24,7 @@ class Shape(Protocol):
     def distance(self, a: Array, b: Array) -> Array:
         """Least signed distance over segments: a, b (3, ...) -> (...)."""
 
-    def of_points(self, p: Array) -> Array:
+    def of_points(self, points: Array) -> Array:
         """Signed distance of points: (3, ...) -> (...)."""
 
     def triangles(self, size: float) -> Array:

@@ -39,17 +39,17 @@ class Box:
             distances[in_box] = _inner_distance(start[:, in_box], direction[:, in_box], self.half)
         return distances.reshape(batch_shape)
 
-    def of_points(self, p: Array) -> Array:
+    def of_points(self, given_points: Array) -> Array:
         """Signed distance of points: (3, ...) -> (...)."""
-        points = self._in_box_axes(p.reshape(3, -1)) - (self.axes.T @ self.centre)[:, None]
+        points = self._in_box_axes(given_points.reshape(3, -1)) - (self.axes.T @ self.centre)[:, None]
         excess = np.abs(points) - self.half[:, None]
         depth = np.minimum(excess.max(axis=0), 0.0)
         np.maximum(excess, 0.0, out=excess)
-        return np.asarray(np.sqrt(np.einsum("km,km->m", excess, excess)) + depth).reshape(p.shape[1:])
+        return np.asarray(np.sqrt(np.einsum("km,km->m", excess, excess)) + depth).reshape(given_points.shape[1:])
 
-    def _in_box_axes(self, v: Array) -> Array:
+    def _in_box_axes(self, vectors: Array) -> Array:
         """Vectors (3, M) in the axes of the box."""
-        components: Array = v.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ v
+        components: Array = vectors.copy() if np.array_equal(self.axes, np.eye(3)) else self.axes.T @ vectors
         return components
 
     def corners(self) -> Array:
@@ -80,15 +80,15 @@ def read_box(entry: Entry) -> Box:
 
 def _outer_distance(start: Array, direction: Array, half: Array) -> Array:
     """Least squared distance of segments from `start` along `direction` (3, M) to the box: (M,), 0 inside."""
-    h = half[:, None]
+    half_size = half[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # (6, M) parameters where the segment crosses the planes of the faces
-        crossings = np.concatenate([(h - start) / direction, (-h - start) / direction])
+        crossings = np.concatenate([(half_size - start) / direction, (-half_size - start) / direction])
     np.clip(np.nan_to_num(crossings, copy=False, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0, out=crossings)
     low, high = np.zeros(start.shape[1]), np.ones(start.shape[1])
-    slope_low, slope_high = (_half_slope(t, start, direction, h) for t in (low, high))
+    slope_low, slope_high = (_half_slope(t, start, direction, half_size) for t in (low, high))
     for t in crossings:
-        slope = _half_slope(t, start, direction, h)
+        slope = _half_slope(t, start, direction, half_size)
         is_closer = (slope <= 0.0) & (t > low)
         low, slope_low = np.where(is_closer, t, low), np.where(is_closer, slope, slope_low)
         is_closer = (slope >= 0.0) & (t < high)
@@ -97,15 +97,15 @@ def _outer_distance(start: Array, direction: Array, half: Array) -> Array:
     share = np.divide(-slope_low, rise, out=np.zeros_like(rise), where=(rise > 0.0) & (slope_low < 0.0))
     t = low + np.minimum(share, 1.0) * (high - low)
     t = np.where(slope_high <= 0.0, high, np.where(slope_low >= 0.0, low, t))
-    excess = np.maximum(np.abs(start + t * direction) - h, 0.0)
+    excess = np.maximum(np.abs(start + t * direction) - half_size, 0.0)
     square: Array = np.einsum("km,km->m", excess, excess)
     return square
 
 
-def _half_slope(t: Array, start: Array, direction: Array, h: Array) -> Array:
+def _half_slope(t: Array, start: Array, direction: Array, half_size: Array) -> Array:
     """Half the derivative of the squared distance along the segments: t (M,) -> (M,)."""
-    p = start + t * direction
-    slope: Array = np.einsum("km,km->m", p - np.clip(p, -h, h), direction)
+    points = start + t * direction
+    slope: Array = np.einsum("km,km->m", points - np.clip(points, -half_size, half_size), direction)
     return slope
 
 

@@ -29,12 +29,12 @@ class Capsule:
         ends = (end.reshape(3, *[1] * (a.ndim - 1)) for end in (self.begin, self.end))
         return segment_distance(a, b, *ends) - self.radius
 
-    def of_points(self, p: Array) -> Array:
+    def of_points(self, points: Array) -> Array:
         """Distance of points to its axis, minus its radius: (3, ...) -> (...)."""
-        begin, direction = (x.reshape(3, *[1] * (p.ndim - 1)) for x in (self.begin, self.end - self.begin))
+        begin, direction = (x.reshape(3, *[1] * (points.ndim - 1)) for x in (self.begin, self.end - self.begin))
         length = float(np.einsum("k...,k...", direction, direction).item())
-        share = np.einsum("k...,k...->...", p - begin, direction) / length if length else 0.0
-        offset = p - begin - np.clip(share, 0.0, 1.0) * direction
+        share = np.einsum("k...,k...->...", points - begin, direction) / length if length else 0.0
+        offset = points - begin - np.clip(share, 0.0, 1.0) * direction
         return np.asarray(np.sqrt(np.einsum("k...,k...->...", offset, offset)) - self.radius)
 
     def triangles(self, size: float) -> Array:

@@ -24,9 +24,9 @@ class Floor:
         lower: Array = np.minimum(a[2], b[2])
         return lower - self.height
 
-    def of_points(self, p: Array) -> Array:
+    def of_points(self, points: Array) -> Array:
         """Height above the floor: (3, ...) -> (...)."""
-        return np.asarray(p[2] - self.height)
+        return np.asarray(points[2] - self.height)
 
     def triangles(self, size: float) -> Array:
         """A square with sides of twice the size."""

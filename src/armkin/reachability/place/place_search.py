@@ -351,11 +351,13 @@ def _axes(
 ) -> tuple[tuple[Array, Array], tuple[slice, slice]]:
     """The x and y of a grid that contains all places with all targets in reach, and the slices in the area."""
     arm = question.arm
-    p = positions_of(question.task, question.targets)[:, :2]
+    points = positions_of(question.task, question.targets)[:, :2]
     distance = arm.reach + float(np.linalg.norm(arm.link[0][:2, 3]))
-    low, high = p.max(axis=0) - distance, p.min(axis=0) + distance  # outside this box some target is out of reach
+    # outside this box some target is out of reach
+    low, high = points.max(axis=0) - distance, points.min(axis=0) + distance
     if area is None:
-        area = [v for axis in (0, 1) for v in (p[:, axis].min() - arm.reach, p[:, axis].max() + arm.reach)]
+        lowest, highest = points.min(axis=0) - arm.reach, points.max(axis=0) + arm.reach
+        area = [lowest[0], highest[0], lowest[1], highest[1]]
     if len(area) != 4 or not np.isfinite(area).all() or area[1] < area[0] or area[3] < area[2]:
         raise UsageError("area: XMIN,XMAX,YMIN,YMAX in mm, each from the lower to the upper end")
     axes, inner = [], []

@@ -163,8 +163,9 @@ def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.
         part = slice(begin, begin + length)
         count = legal[:, part].sum(axis=1, dtype=np.int64)
         carried = count == length
-        for p in np.flatnonzero(carried.any(axis=1)) if length > 1 else ():
-            carried[p] = _on_one_branch(question._replace(targets=question.targets[part]), positions[p], carried[p])
+        for place in np.flatnonzero(carried.any(axis=1)) if length > 1 else ():
+            question_of_path = question._replace(targets=question.targets[part])
+            carried[place] = _on_one_branch(question_of_path, positions[place], carried[place])
         counts += np.where(carried, length, np.minimum(count, length - 1))
         begin += length
     return counts
@@ -198,13 +199,15 @@ def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] |
     if (answer := by_radius(question.arm, question.task.name, shifted, positions, turns)) is None:
         return None
     legal, undecided = answer
-    p, i, k = np.nonzero(undecided)
-    for start in range(0, len(p), BLOCK_TARGETS):
+    place_index, target_index, yaw_index = np.nonzero(undecided)
+    for start in range(0, len(place_index), BLOCK_TARGETS):
         block = slice(start, start + BLOCK_TARGETS)
-        shifted_targets = _shift_targets(question._replace(targets=question.targets[i[block]]), positions[p[block]])
-        yaw = turns[k[block]]
+        shifted_targets = _shift_targets(
+            question._replace(targets=question.targets[target_index[block]]), positions[place_index[block]]
+        )
+        yaw = turns[yaw_index[block]]
         goals = _turn_targets(question.task, shifted_targets, yaw, np.cos(yaw), np.sin(yaw))
-        legal[p[block], i[block], k[block]] = _any_legal(question, goals)
+        legal[place_index[block], target_index[block], yaw_index[block]] = _any_legal(question, goals)
     return legal
 
 
@@ -221,9 +224,9 @@ def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) ->
             edges.append(block.rows.start + block.left)
         unsolved = np.concatenate(edges)
     if len(unsolved):
-        s, rows = question.solve(question.arm, goals[unsolved], question.task.name), in_reach[unsolved]
-        legal[rows] = _legal_turns(question, list(s.q.transpose(2, 1, 0)), s.valid.T)
-        edge = rows[(s.status == Status.BOUNDARY) | (s.status == Status.SINGULAR)]
+        solutions, rows = question.solve(question.arm, goals[unsolved], question.task.name), in_reach[unsolved]
+        legal[rows] = _legal_turns(question, list(solutions.q.transpose(2, 1, 0)), solutions.valid.T)
+        edge = rows[(solutions.status == Status.BOUNDARY) | (solutions.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
     return legal
 
@@ -246,10 +249,12 @@ def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array)
     block_size = max(BLOCK_TARGETS // K, 1)
     for start in range(0, len(target), block_size):
         block = slice(start, start + block_size)
-        m, k = np.nonzero(_within_reach(question, target[block], place[block], turns))
+        pair, yaw_index = np.nonzero(_within_reach(question, target[block], place[block], turns))
         shifted_targets = _shift_targets(question._replace(targets=question.targets[target[block]]), place[block])
-        goals = _turn_targets(question.task, shifted_targets[m], turns[k], cosine[k], sine[k])
-        legal[start + m, k] = _any_legal(question, goals)
+        goals = _turn_targets(
+            question.task, shifted_targets[pair], turns[yaw_index], cosine[yaw_index], sine[yaw_index]
+        )
+        legal[start + pair, yaw_index] = _any_legal(question, goals)
     return legal
 
 
@@ -360,18 +365,18 @@ def _shift_targets(question: PlaceQuestion, position: Array) -> Array:
     return targets
 
 
-def _turn_targets(task: Task, targets: Array, turn: Array, c: Array, s: Array) -> Array:
+def _turn_targets(task: Task, targets: Array, turn: Array, cosine: Array, sine: Array) -> Array:
     """Transform targets in place to a frame turned about z; turn, its cosine and sine: () or (N,)."""
     if task.orientation == "full":
-        _turn_back(targets[:, 0], targets[:, 1], c[..., None], s[..., None])
+        _turn_back(targets[:, 0], targets[:, 1], cosine[..., None], sine[..., None])
         return targets
     for first in (0, 3) if task.orientation == "axis" else (0,):
-        _turn_back(targets[:, first], targets[:, first + 1], c, s)
+        _turn_back(targets[:, first], targets[:, first + 1], cosine, sine)
     if task.name in TURNING:
         targets[:, task.position] -= turn
     return targets
 
 
-def _turn_back(x: Array, y: Array, c: Array, s: Array) -> None:
+def _turn_back(x: Array, y: Array, cosine: Array, sine: Array) -> None:
     """Transform coordinates x and y in place to a frame turned about z; c, s: cosine and sine of the angle."""
-    x[...], y[...] = c * x + s * y, c * y - s * x
+    x[...], y[...] = cosine * x + sine * y, cosine * y - sine * x
