@@ -19,22 +19,22 @@ def test_all_at_once_is_as_posture_by_posture(name: str, monkeypatch: pytest.Mon
     q[:, 4] = 0.0
     q[8:] = np.pi / 4 * rng.integers(-3, 4, (8, 6))
     T, near = armkin.fk(arm, q), rng.uniform(-1.0, 1.0, 6)
-    settled = []
-    settle = linkages.settle
+    decided = []
+    decide = linkages.decide_self_motions
 
-    def keep_settled(*arguments: object) -> linkages.Linkages:
-        settled.append(settle(*arguments))  # type: ignore[arg-type]
-        return settled[-1]
+    def keep_decided(*arguments: object) -> linkages.Linkages:
+        decided.append(decide(*arguments))  # type: ignore[arg-type]
+        return decided[-1]
 
-    def settle_nothing(goals: object, *arguments: object) -> linkages.Linkages:
-        settled_one = settle(goals, *arguments)  # type: ignore[arg-type]
-        none = np.zeros_like(settled_one.known)
-        return settled_one._replace(known=none, lacking=none)
+    def decide_nothing(goals: object, *arguments: object) -> linkages.Linkages:
+        decided_one = decide(goals, *arguments)  # type: ignore[arg-type]
+        none = np.zeros_like(decided_one.known)
+        return decided_one._replace(known=none, lacking=none)
 
-    monkeypatch.setattr(linkages, "settle", keep_settled)
+    monkeypatch.setattr(linkages, "decide_self_motions", keep_decided)
     fast = armkin.ik(arm, T, near=near)
-    assert sum(settled_one.known.sum() for settled_one in settled) > 7
-    monkeypatch.setattr(linkages, "settle", settle_nothing)
+    assert sum(decided_one.known.sum() for decided_one in decided) > 7
+    monkeypatch.setattr(linkages, "decide_self_motions", decide_nothing)
     slow = armkin.ik(arm, T, near=near)
     np.testing.assert_array_equal(fast.status, slow.status)
     np.testing.assert_array_equal(fast.free, slow.free)

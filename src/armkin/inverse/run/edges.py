@@ -83,7 +83,7 @@ def _linkage_seeds(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tupl
         B = np.arange(loose.shape[1])
         column = np.argsort(~loose, axis=1, kind="stable")[:, : max(int(loose.sum(axis=1).max()), 1)]
         ordered = np.take_along_axis(q, column[:, None, :, None], axis=2)
-        linkage = linkages.settle(subset, ordered, np.take_along_axis(loose, column, axis=1))
+        linkage = linkages.decide_self_motions(subset, ordered, np.take_along_axis(loose, column, axis=1))
         if len(rows := np.flatnonzero(linkage.known)):
             # postures of known self-motions and candidates that are not loose, sorted by labels
             k, present = part[rows], ~np.isnan(linkage.q[rows, :, 0])
