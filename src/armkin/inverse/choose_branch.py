@@ -103,8 +103,7 @@ def solve(request: Request, targets: Array, rounding: Array | None = None) -> li
 
     rounding: (N,) of the targets, see `armkin.ik`.
 
-    Raises UsageError if the task does not fit the arm, no branch has the name asked for, or more than
-    MAX_SWEEPS combinations are swept.
+    Raises UsageError if the task does not fit the arm, no branch has that name, or more than MAX_SWEEPS are swept.
     """
     if (count := combinations(request)) > MAX_SWEEPS:
         message = f"{count} combinations of swept values; at most {MAX_SWEEPS} are tried"
@@ -232,8 +231,7 @@ def blocked_error(request: Request, answer: Answer) -> NoBranchError:
 
 
 def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
-    """Index of the first wanted branch (by its flag) within limits and free of hits; if hits are ignored, also one with
-    hits."""
+    """Index of the first wanted branch (by its flag) within limits and free of hits, unless hits are ignored."""
     free = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.may_be_taken)
     hit = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.within_limits and request.ignore)
     return next(free, next(hit, None))

@@ -6,8 +6,7 @@ are called a, b, m1, m2, m3, e and the links after them La .. Le:
 
     Ja La Jb Lb J1 L1 J2 L2 J3 L3 Je Le = I.
 
-One of the middle joints m1, m2, m3 is hidden (it becomes the eigenvalue), one dialytic, one the third; a wide role
-is dialytic in the third, too.
+One of the middle joints m1, m2, m3 is hidden, the eigenvalue, one dialytic; a wide role is so in the third, too.
 """
 
 from dataclasses import dataclass

@@ -32,8 +32,7 @@ def groups(pose: Int, x: Array) -> list[Int]:
 def products(v: Array) -> tuple[Array, Bool, Bool]:
     """Products among mixtures v (G, d, 4, 3 or 4), orthonormal in the pencil's own vectors, whose linear maps they are:
 
-    weights (G, d, d), a row for each vector that may be a product; (G, d) which of these are real; (G,) whether every
-    product in the span is one of them.
+    weights (G, d, d), a row for each vector that may be a product; (G, d) which are real; (G,) whether these are all.
     """
     cubic = np.einsum("ij,gdjk->gdik", _CUBIC, v)
     first, first_fit = _quotient(cubic[:, :, :3], cubic[:, :, 1:])

@@ -112,8 +112,7 @@ def _nearly_real(roots: NDArray[np.complex128], vectors: NDArray[np.complex128],
     """The roots (N, size), with their vectors (N, size, size), whose tilt is below tolerance."""
     tilt = 2 * np.abs(roots.imag) / (1 + np.abs(roots) ** 2)
     pose, index = np.nonzero((roots.imag >= 0) & (tilt < tolerance))
-    # LAPACK turns an eigenvector so that its largest entry is real: the real part is what is left of a
-    # pair of roots that almost touch.
+    # LAPACK turns eigenvectors so that their largest entries are real: of roots that almost touch real parts are left
     x, u = roots[pose, index].real, vectors.real[pose, :, index]
     return _PencilRoots(pose, index, x, tilt[pose, index], u, np.zeros(len(pose), np.bool_))
 

@@ -93,8 +93,7 @@ def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:
 
 
 def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
-    """Stretches (S,) that lie between two samples: legal ones (set_before: no), and such as are not between legal ones
-    (yes); where both begin and end (2, S)."""
+    """Stretches (S,) between two samples, legal ones (set_before: no) or gaps (yes), and their two ends (2, S)."""
     row, k, branch, room = turns
     sign = np.sign(room[:, 0])
     rows = _Ends(follower, row, branch, True)

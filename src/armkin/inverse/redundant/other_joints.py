@@ -91,8 +91,7 @@ class Follower(NamedTuple):
         return self._replace(target=self.target[rows], near=self.near[rows])
 
     def branches_at(self, rows: Int, t: Array) -> Array:
-        """Branches (M, B, n) of targets (M,) at values t (M,), of a closed form each in the column of its index, nan
-        where there is none."""
+        """Branches (M, B, n), nan for none, of targets (M,) at values t (M,), of closed forms in their columns."""
         if not self.redundant.by_formula:
             goal = move_targets(self.arm, self.redundant, self.target[rows], t)
             s = self.ik(self.redundant.rest, goal, self.redundant.task.name, examine=False)

@@ -99,8 +99,7 @@ class Summary(NamedTuple):
 
 
 def summary_of_samples(follower: Follower, t: Array, places: Array | None = None) -> Summary:
-    """What samples of all targets along t (K,) show, and others between them; places: all places where something may
-    change (N, V), with samples beside each."""
+    """What samples of all targets along t (K,) show, and those beside all places (N, V) where something may change."""
     N = len(follower.target)
     at_once = max(AT_A_TIME // len(t), 1)
     parts = (np.arange(k, min(k + at_once, N)) for k in range(0, max(N, 1), at_once))

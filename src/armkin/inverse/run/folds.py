@@ -2,8 +2,7 @@
 
 Most targets that a closed form doubts have the two branches of a fold some 1e-4 rad apart. The residual along the lost
 direction is a cubic between them, whose zeros are known, and whose slopes at them follow from the Jacobians bordered by
-that direction. Where the cubic is conclusive, it agrees with `singular.local_structure`; all other targets are left to
-`singular.components`.
+that direction. Where the cubic is conclusive, it agrees with `singular.local_structure`; `components` has the rest.
 """
 
 from typing import NamedTuple
@@ -67,8 +66,7 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
 
 
 def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: Bool) -> Bool:
-    """Which near roots (K, B) are the second of two that meet; clears `decided` (K,) where the curvature is not
-    conclusive."""
+    """Which near roots (K, B) are the second of two that meet; clears `decided` (K,) where the curvature is vague."""
     is_second, near_roots = np.zeros(near_roots.shape, bool), near_roots & decided[:, None]
     k, b = np.nonzero(near_roots)
     if not len(k):

@@ -12,8 +12,7 @@ Result = TypeVar("Result")
 def share_rows(part: Callable[[slice], Result], count: int, workers: int, least: int, step: int = 1) -> list[Result]:
     """``part(rows)`` of all rows, in their order, by `workers` threads.
 
-    least: fewest rows of a thread; step: shares are multiples of it. One worker gets all rows at once.
-    Raises UsageError for less than one worker.
+    least: fewest rows of a thread; step: shares are multiples of it. Raises UsageError for less than one worker.
     """
     check_workers(workers)
     share = max(least, -(-count // (4 * workers)))  # four shares each, so that a slow thread does not delay the others

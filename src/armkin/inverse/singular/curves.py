@@ -93,8 +93,7 @@ def _next_directions(V: Array, second: Array, directions: Array) -> Array:
 def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> tuple[Array, Array, Array, Array]:
     """Postures (M, n) moved onto the curve beside them, at right angles to it.
 
-    Also right singular vectors there (M, n, n), the curve's direction first, the second smallest singular value (M,)
-    and what is missed (M,).
+    Also right singular vectors there (M, n, n), the curve's first, second smallest singular values and misses (M,).
     """
     r, J = newton.scaled(arm, task, q, target)
     J = J * joints[:, None]

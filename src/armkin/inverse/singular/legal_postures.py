@@ -27,8 +27,7 @@ FINE_STEP = np.deg2rad(0.1)  # step [rad] between the postures of a self-motion 
 def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
     """The branches, with legal ones for targets rows on an edge that have none, where such a posture is found.
 
-    goals, batch: N targets and their branches. The legal posture takes the place of the one that it shares a
-    self-motion with, as `near` would.
+    goals, batch: N targets and their branches. The legal one takes the place of one on its self-motion, as `near`.
     """
     arm, task, target, near = goals
     for k in rows[_may_be_legal(goals, batch, rows)]:

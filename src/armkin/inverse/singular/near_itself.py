@@ -97,8 +97,7 @@ def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, bounds: Arr
 def list_near(goals: Goals, batch: Batch, bounds: Array) -> Batch:
     """The branches, with `near` among them where it solves a rounded target: see `solved_by_near`.
 
-    In place of the branch that it is one with to within the rounding; else beside the others. Where there are no
-    others, the target is a boundary.
+    In place of the branch that it is one with to within the rounding, else beside the others; alone, on a boundary.
     """
     arm, task, target, near = goals
     rows = solved_by_near(arm, task, target, near, bounds)

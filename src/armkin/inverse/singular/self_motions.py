@@ -168,8 +168,7 @@ def _equally_long(offsets: Array, push: Array) -> Bool:
 def _moving_joints(offsets: Array, is_motion: Bool) -> Bool:
     """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
 
-    Roots of high order are off by up to 10 `STILL_TURN`, and a short way that is drawn back to a meeting ends anywhere
-    nearby: neither is motion of a joint.
+    Roots of high order are off by up to 10 `STILL_TURN`, short ways drawn back to a meeting end nearby: no motions.
     """
     length = np.abs(offsets).max(axis=1)
     return np.asarray(np.where(is_motion[:, None], length[1] > tol.MOVED * 10 * STEP, length[0] > 10 * tol.STILL_TURN))

@@ -38,8 +38,7 @@ class Redundancy(NamedTuple):
 
     @property
     def by_formula(self) -> bool:
-        """Whether the others have a closed form that needs no more than its recorded formula, whose branches keep their
-        index along the turn."""
+        """Whether a recorded closed form has all of the others: branches keep their index along the turn."""
         return self.geometry.ordered and self.geometry.pairs is not None and self.geometry.doubts is None
 
 
