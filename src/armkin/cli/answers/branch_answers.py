@@ -2,7 +2,7 @@
 
 from typing import Annotated, NotRequired, TypedDict
 
-from armkin.cli.answers.kinematics import Head, Near, Tooled, Violation
+from armkin.cli.answers.shared_keys import Head, Near, Tooled, Violation
 from armkin.model.units import JointUnits
 
 

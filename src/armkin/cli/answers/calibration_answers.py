@@ -3,7 +3,7 @@
 # No annotations as text here: a key that may be absent is known by NotRequired at run time.
 from typing import Annotated, TypedDict
 
-from armkin.cli.answers.kinematics import Head
+from armkin.cli.answers.shared_keys import Head
 from armkin.model.units import JointUnits
 
 
