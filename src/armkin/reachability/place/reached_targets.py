@@ -378,5 +378,5 @@ def _turn_targets(task: Task, targets: Array, turn: Array, cosine: Array, sine: 
 
 
 def _turn_back(x: Array, y: Array, cosine: Array, sine: Array) -> None:
-    """Transform coordinates x and y in place to a frame turned about z; c, s: cosine and sine of the angle."""
+    """Transform coordinates x and y in place to a frame turned about z; cosine, sine: of the angle."""
     x[...], y[...] = cosine * x + sine * y, cosine * y - sine * x
