@@ -117,8 +117,8 @@ def _unexpected_code(error: BaseException) -> int:
 
         message = str(error.format_message()).rstrip(".")
         context = getattr(error, "ctx", None)
-        if possible := _similar_options(error, context):
-            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(possible)}?"
+        if similar_options := _similar_options(error, context):
+            message = f"{str(error).rstrip('.')}; did you mean {' or '.join(similar_options)}?"
         if message.endswith("'ROBOT'"):
             message += ": a robot file or the name of a shipped robot (armkin robots)"
         if context is not None:

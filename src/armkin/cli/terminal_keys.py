@@ -80,12 +80,12 @@ def keys() -> Iterator[Keys]:
     import termios
     import tty
 
-    before = termios.tcgetattr(sys.stdin)
+    settings = termios.tcgetattr(sys.stdin)
     try:
         tty.setcbreak(sys.stdin)
         yield Keys(_poll_posix)
     finally:
-        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, before)
+        termios.tcsetattr(sys.stdin, termios.TCSAFLUSH, settings)
 
 
 def _poll_posix(seconds: float) -> str:

@@ -125,9 +125,9 @@ def answer_piece(job: Job, piece: Piece) -> Done:
         if job.as_json:
             encoded_parts.append(_json_lines(job.questions, chunk, tally))
         else:
-            table, good = job.questions.table(chunk)
+            table, has_best = job.questions.table(chunk)
             heading = list(table)
-            _count_bad_rows(tally, chunk, good)
+            _count_bad_rows(tally, chunk, has_best)
             encoded_parts.append(encoded(table))
     problem = malformed[0] if malformed else None
     if piece.columns is not None:
@@ -163,9 +163,9 @@ def _json_lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
     return "\n".join([*lines, ""]).encode()
 
 
-def _count_bad_rows(tally: Tally, chunk: Chunk, good: Any) -> None:
-    bad_rows = (~good).nonzero()[0]
-    tally.add(Tally(len(good), len(bad_rows), int(chunk.numbers[int(bad_rows[0])]) if len(bad_rows) else 0))
+def _count_bad_rows(tally: Tally, chunk: Chunk, has_best: Any) -> None:
+    bad_rows = (~has_best).nonzero()[0]
+    tally.add(Tally(len(has_best), len(bad_rows), int(chunk.numbers[int(bad_rows[0])]) if len(bad_rows) else 0))
 
 
 @dataclass
@@ -226,9 +226,9 @@ class BatchRun:
             if not tally.rows:
                 raise pieces.empty(tally.skipped)
             if binary_parts:
-                joined = io.BytesIO()
-                file_format.write_parts(joined, lambda: map(io.BytesIO, binary_parts))
-                write(joined.getvalue())
+                stream = io.BytesIO()
+                file_format.write_parts(stream, lambda: map(io.BytesIO, binary_parts))
+                write(stream.getvalue())
 
 
 def _heading_bytes(finished: Done, job: Job, file_format: Format, tally: Tally) -> bytes:
@@ -294,19 +294,19 @@ class _ToFile:
         """The pieces that no earlier run has finished; those that one has are counted."""
         for piece in pieces:
             self.count = piece.number + 1
-            about = self.parts.about(piece.number) if self.parts.is_held and self.batch.resume else None
-            if about is None:
+            piece_record = self.parts.about(piece.number) if self.parts.is_held and self.batch.resume else None
+            if piece_record is None:
                 yield piece
                 continue
-            if about["input"] != piece.digest():
+            if piece_record["input"] != piece.digest():
                 raise UsageError(
                     f"the input has changed since {self.path}.parts was begun; "
                     f"give it as it was, or remove {self.parts.folder}",
                     file=self.path,
                 )
-            self.tally.add(Tally(*(about[name] for name in ("rows", "bad", "first_bad", "skipped"))))
-            if about["near"] is not None:
-                self.job.questions.near = about["near"]  # type: ignore[attr-defined]
+            self.tally.add(Tally(*(piece_record[name] for name in ("rows", "bad", "first_bad", "skipped"))))
+            if piece_record["near"] is not None:
+                self.job.questions.near = piece_record["near"]  # type: ignore[attr-defined]
 
     def _keep_piece(self, finished: Done) -> None:
         """Count a finished piece and keep its answers: the first in memory, from the second on all on disk."""
@@ -341,7 +341,9 @@ class _ToFile:
     def _put_parts(self, file: IO[bytes]) -> None:
         """Write the heading, if the format has one, and the answers of all pieces to a file."""
         if self.parts.is_held:
-            headings = (about["heading"] for i in range(self.count) if (about := self.parts.about(i)) is not None)
+            headings = (
+                piece_record["heading"] for i in range(self.count) if (piece_record := self.parts.about(i)) is not None
+            )
             heading: list[str] = next((names for names in headings if names), [])
         else:
             assert self.first is not None

@@ -110,11 +110,11 @@ def _once_a_day(port: str, words: Sequence[str]) -> None:
 
     from armkin.board.ports import note_path, read_note, write_note
 
-    path, today = f"{note_path(port)}.told", {"day": date.today().isoformat(), "words": list(words)}
-    if words and read_note(path, _LONGEST_NOTE) != today:
+    path, note = f"{note_path(port)}.told", {"day": date.today().isoformat(), "words": list(words)}
+    if words and read_note(path, _LONGEST_NOTE) != note:
         for word in words:
             output.note(word)
-        write_note(path, today)
+        write_note(path, note)
 
 
 def _goes_on(machine: Backend) -> str:

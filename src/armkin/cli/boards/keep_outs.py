@@ -74,8 +74,8 @@ def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
 
     [(_, hit)] = hits(arm, machine.joints()[None])
     if hit:
-        more = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
-        output.note(f"the arm stands in a hit: it {hits_text(hit)}{more}")
+        allowance = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
+        output.note(f"the arm stands in a hit: it {hits_text(hit)}{allowance}")
 
 
 def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
@@ -91,9 +91,9 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
             return
         held = guard(trajectory.arm)
         t = np.linspace(0.0, trajectory.duration, _POSTURE_COUNT)
-        apart = held.clearances(trajectory.q(t)).min(axis=0, initial=np.inf)
-        for k in np.flatnonzero(apart < 0).tolist():
-            deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-apart[k]))
+        least_clearances = held.clearances(trajectory.q(t)).min(axis=0, initial=np.inf)
+        for k in np.flatnonzero(least_clearances < 0).tolist():
+            deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-least_clearances[k]))
     if deepest:
         ordered = sorted(deepest.items(), key=lambda item: -item[1])
         words = hits_text([{"body": body, "with": obstacle, "depth_mm": depth} for (body, obstacle), depth in ordered])

@@ -21,9 +21,9 @@ def add_trace_option(command: Callable[..., Any]) -> Callable[..., Any]:
     if "no_reset" not in signature(command).parameters:
         return command
     hints = get_type_hints(command, include_extras=True)
-    plain = signature(command)
-    resolved = plain.replace(
-        parameters=[parameter.replace(annotation=hints[name]) for name, parameter in plain.parameters.items()]
+    command_signature = signature(command)
+    resolved = command_signature.replace(
+        parameters=[option.replace(annotation=hints[name]) for name, option in command_signature.parameters.items()]
     )
 
     @wraps(command)

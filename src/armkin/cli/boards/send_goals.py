@@ -68,9 +68,9 @@ def _of_target(arm: Arm, target: str, target_options: TargetOptions) -> Goals:
 
     chosen_task = task_for(arm, target_options.task)
     values = np.array([arguments.target_list(arm, chosen_task, target)])
-    close = None if target_options.near is None else arguments.joint_list(arm, target_options.near, "--near")
-    shown = [[decimal_count(word) for word in target.split(",")]]
-    rounding = printed_rounding(label_units(chosen_task.labels), values, arm.reach, shown)
+    near_joints = None if target_options.near is None else arguments.joint_list(arm, target_options.near, "--near")
+    decimals = [[decimal_count(word) for word in target.split(",")]]
+    rounding = printed_rounding(label_units(chosen_task.labels), values, arm.reach, decimals)
     held = lock_and_sweep.locked_values(arm, target_options.lock)
     return Goals(
         joints=None,
@@ -79,7 +79,7 @@ def _of_target(arm: Arm, target: str, target_options: TargetOptions) -> Goals:
         task=chosen_task.name,
         branch=target_options.branch,
         held=held,
-        near=close,
+        near=near_joints,
         rounding=rounding,
     )
 
@@ -196,16 +196,16 @@ def _of_pulses(arm: Arm, q: Array, counts: list[int]) -> Array:
         raise UsageError(f"the answer has {len(counts)} pulses, {arm.name} has {len(arm.motor_gain)} motors")
     if max(map(abs, counts)) > _MAX_PULSES:
         raise UsageError(f"the answer on standard input is damaged: {max(counts, key=abs)} pulses")
-    meant = armkin.joints(arm, counts)
-    pulse_error = np.abs(meant - q) / resolution(arm)
-    if (worst := int(pulse_error.argmax())) >= 0 and pulse_error[worst] > _NEIGHBOUR_DISTANCE:
-        shown, by_pulses = (float(units.joints_out(arm, values)[worst]) for values in (q, meant))
-        name = arm.joint_names[worst]
+    pulse_joints = armkin.joints(arm, counts)
+    pulse_error = np.abs(pulse_joints - q) / resolution(arm)
+    if (joint := int(pulse_error.argmax())) >= 0 and pulse_error[joint] > _NEIGHBOUR_DISTANCE:
+        stated_value, pulse_value = (float(units.joints_out(arm, values)[joint]) for values in (q, pulse_joints))
+        name = arm.joint_names[joint]
         raise UsageError(
-            f"the answer contradicts itself: {name} = {shown:.10g}, and its pulses mean {name} = {by_pulses:.10g}: "
-            "compute it again",
+            f"the answer contradicts itself: {name} = {stated_value:.10g}, and its pulses mean {name} = "
+            f"{pulse_value:.10g}: compute it again",
             joint=name,
-            value=shown,
-            by_pulses=by_pulses,
+            value=stated_value,
+            by_pulses=pulse_value,
         )
-    return meant
+    return pulse_joints

@@ -139,14 +139,14 @@ class _Session:
         from armkin.files import write_whole
         from armkin.robot_file import parse_robot_file
 
-        made = self.corrected(findings)
+        text = self.corrected(findings)
         target = out or self.path
-        if made == self.text:
+        if text == self.text:
             output.note(f"nothing to correct in {self.path}")
             return
-        parse_robot_file(made, target)  # nothing is written that no command would take
+        parse_robot_file(text, target)  # nothing is written that no command would take
         difference = difflib.unified_diff(
-            self.text.splitlines(keepends=True), made.splitlines(keepends=True), self.path, target, n=1
+            self.text.splitlines(keepends=True), text.splitlines(keepends=True), self.path, target, n=1
         )
         with output.destination(None) as write:
             write("".join(difference))
@@ -156,7 +156,7 @@ class _Session:
         if _read_text(self.path) != self.text:
             raise FileError(f"{self.path} has changed meanwhile: nothing was written", file=self.path)
         with write_whole(target, corrects=out is None) as file:
-            file.write(made)
+            file.write(text)
         output.note(f"wrote {target}")
 
 

@@ -109,10 +109,10 @@ def _file_text(calibration: Calibration, arm: Arm) -> str:
     """The corrected robot file, with the errors before and after at its top."""
     from armkin.robot_file.robot_file_text import format_robot_file
 
-    before, after = calibration.rms("before"), calibration.rms("after")
+    rms_before, rms_after = calibration.rms("before"), calibration.rms("after")
     heading = [
         f"{arm.name}, calibrated from {len(calibration.before)} measured poses by armkin calibrate.",
-        f"On rows not used: {before:.3f} mm rms before, {after:.3f} mm after.",
+        f"On rows not used: {rms_before:.3f} mm rms before, {rms_after:.3f} mm after.",
     ]
     return format_robot_file(calibration.data, heading)
 
@@ -122,8 +122,8 @@ def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str
     from armkin.calibration.calibrate_arm import next_poses
     from armkin.columns.csv_cells import csv_line
 
-    before = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
-    suggested = units.joints_out(arm, next_poses(arm, count, before, fix=kinds)).round(9).tolist()
+    measured_q = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
+    suggested = units.joints_out(arm, next_poses(arm, count, measured_q, fix=kinds)).round(9).tolist()
     with output.destination(out) as write:
         if json:
             answer = {**render.head(arm), "joint_units": units.unit_names(arm), "poses": suggested}
@@ -136,19 +136,19 @@ def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | N
     """A calibration as data of JSON [mm, deg]; numbers: of its rows in their file. Errors are without flagged rows."""
     import numpy as np
 
-    used = np.delete(np.arange(len(calibration.before)), calibration.flagged)
+    used_rows = np.delete(np.arange(len(calibration.before)), calibration.flagged)
     corrections = []
     for name, value, doubt, unit in calibration.corrections:
-        shown, size = _UNITS[unit]
-        stated = None if np.isnan(doubt) else doubt * size
-        corrections.append({"name": name, "value": value * size, "deviation": stated, "unit": shown})
+        unit_text, size = _UNITS[unit]
+        deviation = None if np.isnan(doubt) else doubt * size
+        corrections.append({"name": name, "value": value * size, "deviation": deviation, "unit": unit_text})
     return {
         **render.head(arm),
         "rows": len(calibration.before),
         "level": calibration.level,
         "corrected": calibration.kinds,
-        "before": _error_statistics(calibration.before[used]),
-        "after": _error_statistics(calibration.after[used]),
+        "before": _error_statistics(calibration.before[used_rows]),
+        "after": _error_statistics(calibration.after[used_rows]),
         "noise_mm": calibration.noise,
         "flagged": [{"row": numbers[k], "off_mm": float(calibration.after[k])} for k in calibration.flagged],
         "corrections": corrections,

@@ -76,7 +76,7 @@ def export(
         "--js": (js, partial(_write_js, task=task, out=out)),
         "--html": (html, partial(_write_html, task=task, path=path, meshes=meshes, out=out)),
     }
-    chosen = _one_chosen({name: is_chosen for name, (is_chosen, _) in kinds.items()})
+    kind = _one_chosen({name: is_chosen for name, (is_chosen, _) in kinds.items()})
     if single and not c:
         raise UsageError("--float goes with --c alone")
     if path is not None and not html:
@@ -84,18 +84,19 @@ def export(
     if meshes is not None and not html:
         raise UsageError("--meshes goes with --html alone")
     if not c:
-        output.check_destination(out, f"export {chosen} is", *_ENDINGS[chosen])
-    _, write_file = kinds[chosen]
+        output.check_destination(out, f"export {kind} is", *_ENDINGS[kind])
+    _, write_file = kinds[kind]
     write_file(arguments.load_arm(robot, scene))
 
 
 def _one_chosen(kinds: dict[str, bool]) -> str:
     """The only given option of these. Raises UsageError for none or several."""
-    chosen = [name for name, is_chosen in kinds.items() if is_chosen]
-    if len(chosen) != 1:
-        listed = ", ".join(kinds)
-        raise UsageError(f"export: say as what, one of {listed}" + (f"; got {' and '.join(chosen)}" if chosen else ""))
-    return chosen[0]
+    chosen_kinds = [name for name, is_chosen in kinds.items() if is_chosen]
+    if len(chosen_kinds) != 1:
+        kinds_text = ", ".join(kinds)
+        chosen_text = f"; got {' and '.join(chosen_kinds)}" if chosen_kinds else ""
+        raise UsageError(f"export: say as what, one of {kinds_text}{chosen_text}")
+    return chosen_kinds[0]
 
 
 def _write_urdf(arm: Arm, out: str | None) -> None:
@@ -106,8 +107,8 @@ def _write_urdf(arm: Arm, out: str | None) -> None:
 
     with output.destination(out) as write:
         write(urdf_text(arm))
-    if slow := [name for name, speed in zip(arm.joint_names, arm.max_speed, strict=True) if np.isnan(speed)]:
-        output.note(f"velocity is 0 for {', '.join(slow)}: the robot file has no max_speed there")
+    if without_speed := [name for name, speed in zip(arm.joint_names, arm.max_speed, strict=True) if np.isnan(speed)]:
+        output.note(f"velocity is 0 for {', '.join(without_speed)}: the robot file has no max_speed there")
 
 
 def _write_table(arm: Arm, convention: str, out: str | None) -> None:

@@ -63,20 +63,20 @@ def _board_kind(robot: str | None, board: str | None) -> str:
     """The kind of board, by the robot file or by --board; UsageError where they differ or it is unknown."""
     from armkin.board_catalogue import BOARDS
 
-    named = board
+    kind = board
     if robot is not None:
         arm = arguments.load_arm(robot)
         arm_board = arm.board.kind if arm.board is not None else None
         if board is not None and arm_board is not None and arm_board != board:
             raise UsageError(f"{arm.name}'s board is {arm_board}, and --board says {board}: leave one of them out")
-        named = board or arm_board
-        if named is None:
+        kind = board or arm_board
+        if kind is None:
             raise UsageError(f"{arm.name} names no board: add --board, one of {', '.join(BOARDS)}")
-    if named is None:
+    if kind is None:
         raise UsageError(f"which board? Name a robot file with board:, or --board, one of {', '.join(BOARDS)}")
-    if named not in BOARDS:
-        raise UsageError(f"armkin has no firmware for '{named}': it has for {', '.join(BOARDS)}")
-    return named
+    if kind not in BOARDS:
+        raise UsageError(f"armkin has no firmware for '{kind}': it has for {', '.join(BOARDS)}")
+    return kind
 
 
 def _only_port(kind: str) -> str:

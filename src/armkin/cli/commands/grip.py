@@ -77,8 +77,10 @@ def _gripper_value(board: Board, text: str, option: str) -> str | float:
     board.check_grip("open")
     if text in _WORD:
         return _WORD[text]
-    if not is_number(text) and (close := get_close_matches(text.lower(), _WORD, 1)):
-        raise UsageError(f"{option}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[close[0]]}?")
+    if not is_number(text) and (similar_words := get_close_matches(text.lower(), _WORD, 1)):
+        raise UsageError(
+            f"{option}: '{text}' is neither open nor closed nor a number; did you mean {_WORD[similar_words[0]]}?"
+        )
     value = number(text, option)
     board.check_grip(value)
     return value

@@ -60,9 +60,9 @@ def home(
     with board_link.open_backend(board, port, baud, simulated=_REHEARSAL, reset=not no_reset) as machine:
         switch_report: dict[str, Any] = {}
         keep_outs.check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
-        lost = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
-        if lost is not None:
-            switch_report["lost_steps"] = _lost_steps(arm, lost)
+        lost_steps = board.home(joints or (), lambda name: output.note(f"homing {name}"), rest_at_home=rest_at_home)
+        if lost_steps is not None:
+            switch_report["lost_steps"] = _lost_steps(arm, lost_steps)
         if not stay:
             output.note("moving to the home pose")
             board.go_home()
@@ -71,10 +71,10 @@ def home(
         write(render.to_json(answer) + "\n" if json else board_link.where_text(arm, answer))
 
 
-def _lost_steps(arm: Arm, lost: Sequence[LostSteps]) -> list[dict[str, Any]]:
+def _lost_steps(arm: Arm, searches: Sequence[LostSteps]) -> list[dict[str, Any]]:
     """What the switches tell of the counts, as JSON; a warning where more than a step is missing."""
     rows = []
-    for search in lost:
+    for search in searches:
         slides = arm.prismatic[arm.joint_names.index(search.joint)]
         unit = 1.0 if slides else units.DEGREE
         difference = None if search.difference is None else search.difference / unit

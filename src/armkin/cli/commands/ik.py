@@ -93,7 +93,7 @@ def ik(
     piped = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
     arm = arguments.load_arm(arguments.required_robot(robot), scene, tool) if piped is None else piped[0]
     chosen_task = task_for(arm, task)
-    reached = None if piped is None else _reached_targets(arm, chosen_task, piped[1])
+    targets_of_pulses = None if piped is None else _reached_targets(arm, chosen_task, piped[1])
     held = lock_and_sweep.locked_values(arm, lock)
     request = choose_branch.Request(
         arm=arm,
@@ -107,20 +107,20 @@ def ik(
     )
     request = _request_with_solver(request, chosen_task.name, compiled=compiled)
     questions = IkQuestions(request, chosen_task, all_branches, turns, continuous)
-    if batch is not None or (reached is not None and len(reached) > 1):
+    if batch is not None or (targets_of_pulses is not None and len(targets_of_pulses) > 1):
         from armkin.cli.batches.batch_answers import BatchRun
         from armkin.cli.batches.batch_pieces import InputRows
 
         arguments.no_numbers(target)
-        rows = InputRows(batch, chosen_task.labels, f"task {chosen_task.name}", None, reached or [])
+        rows = InputRows(batch, chosen_task.labels, f"task {chosen_task.name}", None, targets_of_pulses or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
         BatchRun(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
         return
     arguments.one_alone(workers, cluster, resume)
-    if reached is None:
+    if targets_of_pulses is None:
         values, words = arguments.target(arm, chosen_task, target), [[decimal_count(word) for word in target or ()]]
     else:
-        values, words = reached[0], None
+        values, words = targets_of_pulses[0], None
     _single_target(questions, one_row(values).values, words, out, json=json)
 
 
@@ -235,10 +235,10 @@ class IkQuestions:
 
         targets = targets_in(self.task.labels, chunk.values)
         rounding = _decimal_rounding(self.request.arm, self.task, chunk.values)
-        quick = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
+        nearest_in_c = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
         numbers = chunk.numbers_array()
         answered = ik_columns.branch_columns(
-            self.request, targets, numbers, self.all_branches, quick, rounding=rounding
+            self.request, targets, numbers, self.all_branches, nearest_in_c, rounding=rounding
         )
         return answered.table, ~answered.unsolved
 
@@ -251,19 +251,19 @@ class IkQuestions:
         measures = ("within_limits", "residual_mm", "residual_deg", "motion")
         heading = ["row", "status", "branch", *self.request.arm.joint_names, *measures]
         records: list[list[Any]] = []
-        solved: list[bool] = []
+        has_best: list[bool] = []
         for number, answer in zip(chunk.numbers, self.objects(chunk, with_closest=False), strict=True):
             records += _csv_records(self.request.arm, int(number), answer)
-            solved.append(answer["best"] is not None)
-        return table_of_records(heading, records), np.array(solved)
+            has_best.append(answer["best"] is not None)
+        return table_of_records(heading, records), np.array(has_best)
 
     def objects(self, chunk: Chunk, with_closest: bool = True) -> Iterator[Ik]:
         """An object a row."""
         from armkin.inverse import choose_branch
 
-        most = choose_branch.most_targets(self.request)
-        for first in range(0, len(chunk.values), most):
-            part = chunk.values[first : first + most]
+        part_size = choose_branch.most_targets(self.request)
+        for first in range(0, len(chunk.values), part_size):
+            part = chunk.values[first : first + part_size]
             targets = targets_in(self.task.labels, part)
             answers = choose_branch.solve(self.request, targets, _decimal_rounding(self.request.arm, self.task, part))
             requests = (
@@ -271,13 +271,13 @@ class IkQuestions:
                 if self.continuous
                 else ((self.request, answer_set) for answer_set in answers)
             )
-            alone = self.continuous or not with_closest  # each row's `near` is another one
-            nearest = {} if alone else nearest_to(self.request, targets, answers)
+            row_by_row = self.continuous or not with_closest  # each row's `near` is another one
+            nearest = {} if row_by_row else nearest_to(self.request, targets, answers)
             for k, (values, goal, (request, answer_set)) in enumerate(
                 zip(part.tolist(), targets, requests, strict=True)
             ):
-                missed = with_closest and answer_set.best is None
-                closest = closest_pose(request, goal, answer_set, nearest.get(k)) if missed else None
+                wants_closest = with_closest and answer_set.best is None
+                closest = closest_pose(request, goal, answer_set, nearest.get(k)) if wants_closest else None
                 yield answer_of(request, self.task, values, answer_set, self.all_branches, self.turns, closest)
                 if self.continuous and answer_set.best is not None:
                     self.request = replace(request, near=answer_set.branches[answer_set.best].joints)

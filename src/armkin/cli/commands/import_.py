@@ -73,17 +73,18 @@ def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
     from armkin.robot_file import urdf_reader
     from armkin.robot_file.robot_file_text import format_robot_file
 
-    snapped = arm_of_file(
+    snapped_arm = arm_of_file(
         robot_file.parse_robot_file(
             format_robot_file(urdf_reader.parse_urdf(raw, base=imported.base, tip=imported.tip, snap=True).data)
         )
     )
     try:
-        before, after = armkin.method(arm)[0], armkin.method(snapped)[0]
+        method, snapped_method = armkin.method(arm)[0], armkin.method(snapped_arm)[0]
     except UsageError:
         return None
-    if before == after:
+    if method == snapped_method:
         return None
     q = np.random.default_rng(2).uniform(-2.0, 2.0, (200, arm.n)) * np.where(arm.prismatic, arm.reach / 4, 1.0)
-    moved = np.linalg.norm((armkin.fk(arm, q) - armkin.fk(snapped, q))[:, :3, 3], axis=1).max()
-    return f"ik is solved as: {before}; with --snap as: {after}, and the tip moves by up to {moved:.2g} mm"
+    tip_distance = np.linalg.norm((armkin.fk(arm, q) - armkin.fk(snapped_arm, q))[:, :3, 3], axis=1).max()
+    tip_text = f"the tip moves by up to {tip_distance:.2g} mm"
+    return f"ik is solved as: {method}; with --snap as: {snapped_method}, and {tip_text}"

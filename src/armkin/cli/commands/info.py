@@ -92,9 +92,9 @@ def _motor_json(motor: Motor, file: RobotFile) -> dict[str, Any]:
         for key in ("full_steps", "microsteps", "gear", "pulley", "lead"):
             entry.pop(key, None)  # a servo of either kind has none
     types = {joint.name: joint.type for joint in file.joints}
-    sliding = all(types[name] == "prismatic" for name in motor.joints)
+    is_prismatic = all(types[name] == "prismatic" for name in motor.joints)
     per_unit = motor.pulses_per_unit()
-    entry["unit"] = "mm" if sliding and motor.kind == "stepper" else "deg"
+    entry["unit"] = "mm" if is_prismatic and motor.kind == "stepper" else "deg"
     entry["pulses_per_unit"] = per_unit
     entry["unit_per_pulse"] = 1.0 / per_unit
     return entry
@@ -120,14 +120,14 @@ def _solving_json(arm: Arm, name: str | None) -> Solving:
         "solver": None,
         "ik_refuses": None,
     }
-    if spare := redundancy(actual_arm(arm), task.name):
-        method, why, complete = method_of_families(arm, spare)
-        solving["redundant"] = arm.joint_names[spare.joint]
-        solving["solver"] = {"method": method, "why": why, "complete": complete}
+    if redundant := redundancy(actual_arm(arm), task.name):
+        method, reason, complete = method_of_families(arm, redundant)
+        solving["redundant"] = arm.joint_names[redundant.joint]
+        solving["solver"] = {"method": method, "why": reason, "complete": complete}
         return solving
     try:
-        method, why, complete = armkin.method(arm, task.name)
-        solving["solver"] = {"method": method, "why": why, "complete": complete}
+        method, reason, complete = armkin.method(arm, task.name)
+        solving["solver"] = {"method": method, "why": reason, "complete": complete}
     except UsageError as error:
         solving["ik_refuses"] = str(error)
     return solving

@@ -54,8 +54,8 @@ def jog(
         joint_rate = float(units.joints_in(arm, [rate] * arm.n)[j])
         allowed = board.ready_to_jog(j, joint_rate)
         if allowed != joint_rate:
-            slower = abs(rate * allowed / joint_rate)
-            output.warn(f"the position is lost: {slower:g} instead of {speed}, and no limits")
+            allowed_speed = abs(rate * allowed / joint_rate)
+            output.warn(f"the position is lost: {allowed_speed:g} instead of {speed}, and no limits")
         board.jog(j, allowed, time)
         answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
     with output.destination(None) as write:

@@ -79,10 +79,10 @@ def new(
     title = os.path.basename(name)
     if asks and floor is None:
         floor = _ask_floor(lambda z: _check_file(new_file_text(title, convention, rows, source, z), path))
-    made = new_file_text(title, convention, rows, source, floor)
-    _check_file(made, path)  # what it refuses, limits for one, is told in its words, and nothing is written
+    file_text = new_file_text(title, convention, rows, source, floor)
+    _check_file(file_text, path)  # what it refuses, limits for one, is told in its words, and nothing is written
     with output.destination(path) as write:
-        write(made)
+        write(file_text)
     if path != "-":
         word = shlex.quote(path)
         output.note(f"wrote {path}; armkin info {word} prints it as papers do, armkin fk {word} home where it stands")
@@ -120,8 +120,8 @@ def _lacking_error(table: bool, convention: str | None) -> UsageError:
 def _output_path(name: str, out: str | None) -> str:
     base = os.path.basename(name)
     if not re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9 _.-]{0,79}", base) or base.endswith((".yaml", ".yml")):
-        plain = re.sub(r"\.ya?ml$", "", base)
-        advice = "" if plain == base else f"; write {plain}"
+        base_without_ending = re.sub(r"\.ya?ml$", "", base)
+        advice = "" if base_without_ending == base else f"; write {base_without_ending}"
         raise UsageError(f"NAME: '{name}' is the arm's name, letters and digits{advice}")
     path = out or f"{name}.yaml"
     if path != "-" and os.path.exists(path):

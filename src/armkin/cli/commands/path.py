@@ -123,10 +123,10 @@ def path(
     arm = keep_outs.load_moving_arm(robot, scene, ignore_keep_out, tool)
     locked = lock_and_sweep.locked_radians(arm, lock)
     locked_arm = armkin.lock(arm, locked) if locked else arm
-    drawn = drawing_path.drawing_moves(
+    drawing_moves = drawing_path.drawing_moves(
         locked_arm, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by
     )
-    moves = _moves_of(locked_arm, file, via, task) if drawn is None else drawn
+    moves = _moves_of(locked_arm, file, via, task) if drawing_moves is None else drawing_moves
     output.check_destination(out, "a plan is", ".csv")
     options: dict[str, Any] = {
         "branch": branch,
@@ -259,8 +259,8 @@ def _moves_of(arm: Arm, file: str | None, via: list[str] | None, task: str | Non
 
 def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:
     """`--via X,Y,Z`, or with the rest of the target."""
-    short = labels[: 2 if labels[2:3] != ("z",) else 3]
-    return comma_separated(text, short if text.count(",") + 1 == len(short) else labels, "--via")
+    position_labels = labels[: 2 if labels[2:3] != ("z",) else 3]
+    return comma_separated(text, position_labels if text.count(",") + 1 == len(position_labels) else labels, "--via")
 
 
 def _number_from(text: str, option: str, minimum: float) -> float:
@@ -308,11 +308,11 @@ def _lay_rehearsal(plan: PathPlan, *, rehearsal: bool = True) -> list[Planned] |
     )
 
 
-def _answer(plan: PathPlan, laid: list[Planned] | None) -> dict[str, Any]:
+def _answer(plan: PathPlan, parts: list[Planned] | None) -> dict[str, Any]:
     """The answer as data."""
     from armkin.motion.path_planner.branch_report import plan_fields
 
-    segments = None if laid is None else sum(part.segments for part in laid[plan.approach is not None :])
+    segments = None if parts is None else sum(part.segments for part in parts[plan.approach is not None :])
     return {**render.head(plan.arm), **plan_fields(plan), "segments": segments}
 
 

@@ -117,9 +117,10 @@ def _grid_settings(step: str, z: str, yaw: str, area: str | None) -> dict[str, A
 
 def _no_place(places: Sequence[Place], targets: str) -> NoSolutionError:
     """How many of the targets are reached where no place reaches all."""
-    best = max(places, key=lambda candidate: int(candidate.reached.max()))
+    best_place = max(places, key=lambda candidate: int(candidate.reached.max()))
+    most_reached = int(best_place.reached.max())
     return NoSolutionError(
-        f"no place reaches all {best.of} {targets}; {best.arm.name} reaches {int(best.reached.max())} at best"
+        f"no place reaches all {best_place.of} {targets}; {best_place.arm.name} reaches {most_reached} at best"
     )
 
 
@@ -187,7 +188,7 @@ def _text(places: Sequence[Place]) -> str:
     rows = [["robot", "x/mm", "y/mm", "z/mm", "yaw/deg", "reached", "margin/mm", "places that reach all"]]
     for candidate in places:
         i, j, k = candidate.best
-        reached = f"{candidate.reached[i, j, k]} of {candidate.of}"
+        count_text = f"{candidate.reached[i, j, k]} of {candidate.of}"
         numbers = [
             *map(render.short_text, candidate.xyz.tolist()),
             render.short_text(float(candidate.yaw[k]) * 57.29577951308232),
@@ -196,7 +197,7 @@ def _text(places: Sequence[Place]) -> str:
             [
                 candidate.arm.name,
                 *numbers,
-                reached,
+                count_text,
                 f"{candidate.margin[i, j, k]:.1f}",
                 f"{candidate.reach_all:,} of {candidate.reached.size:,}",
             ]

@@ -104,8 +104,8 @@ def _draw_pose(arm: Arm, values: list[float], out: str | None, **style: Any) -> 
 
     q = units.joints_in(arm, values)
     plot_poses(arm, q, out, title=render.pose_line(arm, values), **style)
-    [outside] = render.violations(arm, np.array([values]), q[None])
-    render.warn_of_limits(arm, outside)
+    [violations] = render.violations(arm, np.array([values]), q[None])
+    render.warn_of_limits(arm, violations)
 
 
 def _draw_poses(arm: Arm, poses: Any, out: str | None, **style: Any) -> None:

@@ -123,7 +123,7 @@ class _Row(NamedTuple):
             "within_limits": not self.violations,
             "violations": self.violations,
             "outside_travel": [
-                motor for motor, beyond in zip(of_all["motors"], self.beyond_travel, strict=True) if beyond
+                motor for motor, is_outside in zip(of_all["motors"], self.beyond_travel, strict=True) if is_outside
             ],
         }
         return cast("Pulses", answer)
@@ -156,11 +156,11 @@ def _answers(arm: Arm, chunk: Chunk, origin: list[float], best: bool) -> Iterato
     rows = map(_Row, *(column.tolist() for column in columns), violations, beyond_travel)
     beside_best = repeat({}) if best_vectors is None else _rounded_keys(best_vectors)
     in_scene = render.scene_and_tool(arm)
-    for row, near, plain in zip(rows, render.near_by(arm, q), beside_best, strict=False):
+    for row, near, rounded_keys in zip(rows, render.near_by(arm, q), beside_best, strict=False):
         answer = row.answer(of_all)
         answer.update(in_scene)
         answer.update(near)
-        answer.update(plain)
+        answer.update(rounded_keys)
         yield answer
 
 
@@ -195,8 +195,8 @@ def _text(arm: Arm, answer: Pulses) -> str:
     error = f"{fixed_text(answer['error_mm'], 6)} mm"
     last = f"the tip is {error} off"
     if "rounded" in answer:
-        gain, before = fixed_text(answer["gain_mm"], 6), fixed_text(answer["rounded"]["error_mm"], 6)
-        last += f", {gain} mm nearer than with each motor rounded by itself ({before} mm)\n"
+        gain, rounded_error = fixed_text(answer["gain_mm"], 6), fixed_text(answer["rounded"]["error_mm"], 6)
+        last += f", {gain} mm nearer than with each motor rounded by itself ({rounded_error} mm)\n"
         last += f"best of {answer['tried']} pulse vectors around the target"
     tables = (render.table(motors, (0, 3)), render.table(joints, (0, 5)), render.table(tip, (0, 4)))
     return "\n\n".join([render.pose_line(arm, answer["joints"]), *tables, last]) + "\n"

@@ -88,12 +88,12 @@ def _answer(reach: Reach) -> Answer:
 
 def _text(answer: Answer) -> str:
     share = 100 * answer["reached"] / answer["cells"]
-    how = "by arcs of joint 1" if answer["method"] == "arcs" else "pose by pose"
+    method_text = "by arcs of joint 1" if answer["method"] == "arcs" else "pose by pose"
     return (
         f"{answer['robot']}: {answer['reached']:,} of {answer['cells']:,} cells reached ({share:.1f} %), "
         f"{answer['volume_mm3'] / 1e9:.4g} m3\n\n"
         f"{answer['answers']:,} poses (task {answer['task']}, {_orientations_text(answer['orientations'])} a cell) "
-        f"from {answer['solves']:,} solves {how}, in {answer['seconds']:.2f} s\n"
+        f"from {answer['solves']:,} solves {method_text}, in {answer['seconds']:.2f} s\n"
     )
 
 

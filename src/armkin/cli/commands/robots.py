@@ -40,7 +40,7 @@ def _robot_entry(name: str) -> ShippedRobot:
         **render.head(arm),
         "description": arm.description,
         "joints": list(arm.joint_names),
-        "joint_types": ["prismatic" if sliding else "revolute" for sliding in arm.prismatic],
+        "joint_types": ["prismatic" if is_prismatic else "revolute" for is_prismatic in arm.prismatic],
         "task": task,
         "target_labels": labels,
         "can": {"ik": not refused, **{command: not lacks[command] for command in _CAPABILITIES[1:]}},

@@ -23,6 +23,6 @@ def schema(
     if path and scene:
         raise UsageError("--path and --scene: give one of the two")
     reader = path_file if path else robot_file
-    made = scene_schema() if scene else reader.json_schema()
+    json_schema = scene_schema() if scene else reader.json_schema()
     with output.destination(out) as write:
-        write(json.dumps(made, indent=2) + "\n")
+        write(json.dumps(json_schema, indent=2) + "\n")

@@ -204,14 +204,14 @@ def _plan_and_move(
                 _write_trace(arm, plans, trace)
             began = machine.counts()
             _carry_out(planner, plans, held)
-        planned = planner.total_sent.summary(began)
-        answer: dict[str, Any] = {**planned, "port": machine.port.name, **where_arm_stands(machine)}
-    _report_end(arm, planned, answer, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
+        plan_totals = planner.total_sent.summary(began)
+        answer: dict[str, Any] = {**plan_totals, "port": machine.port.name, **where_arm_stands(machine)}
+    _report_end(arm, plan_totals, answer, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
 
 def _report_end(
     arm: Arm,
-    planned: Mapping[str, Any],
+    plan_totals: Mapping[str, Any],
     answer: Mapping[str, Any],
     problem: ArmkinError | None,
     trace: str | None,
@@ -220,13 +220,13 @@ def _report_end(
 ) -> None:
     """Print where the arm stands after a motion; then raise what ended it, if anything did."""
     answer = {**render.head(arm), **answer}
-    if problem is not None and not planned["waypoints"]:
+    if problem is not None and not plan_totals["waypoints"]:
         raise problem  # nothing has moved: there is nothing to tell
     if problem is not None and json and not isinstance(problem, NoSolutionError):
         problem.fields["sent"] = answer  # exit codes 0 and 3 alone have something on stdout
         raise problem
     with output.answer_stream(trace) as write:
-        write(render.to_json(answer) + "\n" if json else _arrival_text(arm, planned, answer))
+        write(render.to_json(answer) + "\n" if json else _arrival_text(arm, plan_totals, answer))
     if problem is not None:
         raise problem
 
@@ -312,12 +312,12 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
             began += plan.duration
 
 
-def _arrival_text(arm: Arm, planned: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
+def _arrival_text(arm: Arm, plan_totals: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
     """Where the arm stands, and whether that is where the plan ends."""
     text = board_link.where_text(arm, answer)
     if answer["pulses"] is None:
         return text
-    motors = zip(answer["motors"], answer["pulse_units"], planned["pulses"], answer["pulses"], strict=True)
+    motors = zip(answer["motors"], answer["pulse_units"], plan_totals["pulses"], answer["pulses"], strict=True)
     differences = [f"{name} {count - goal:+d} {unit}" for name, unit, goal, count in motors if count != goal]
     differs = f"not as planned: {', '.join(differences)}" if differences else "as planned"
     return f"{text}read back: {differs}, {answer['duration_s']:.3f} s\n"

@@ -49,8 +49,8 @@ def setup(
         answer["written"], text = write, _text(answer["differences"], write)
     else:
         answer["printer_cfg"], text = file, f"{file}\n{_differences_text(answer['differences'])}"
-    with output.destination(None) as put:
-        put(render.to_json(answer) + "\n" if json else text)
+    with output.destination(None) as write_out:
+        write_out(render.to_json(answer) + "\n" if json else text)
 
 
 def _differences_text(differences: list[dict[str, Any]] | None) -> str:

@@ -65,23 +65,23 @@ def _until_signal(refresh: Callable[[], None], stop: Callable[[], bool]) -> Iter
 def _print_changes(texts: Iterator[str]) -> None:
     """On a terminal in place; else what differs from the text before."""
     if not sys.stdout.isatty():
-        before = ""
+        last_text = ""
         with output.destination(None) as write:
             for text in texts:
-                if text != before:
+                if text != last_text:
                     write(text)
                     sys.stdout.flush()
-                before = text
+                last_text = text
         return
     from rich.live import Live
     from rich.text import Text
 
-    before = ""
+    last_text = ""
     with Live(auto_refresh=False) as live:
         for text in texts:
-            if text != before:  # drawing what stands there makes it flicker
+            if text != last_text:  # drawing what stands there makes it flicker
                 live.update(Text(text.rstrip()), refresh=True)
-            before = text
+            last_text = text
 
 
 def _report_text(answer: dict[str, Any]) -> str:

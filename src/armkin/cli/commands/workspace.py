@@ -185,5 +185,5 @@ def _text(answer: Mapping[str, Any]) -> str:
     measure, unit = ("volume", "mm3") if "volume_mm3" in answer else ("area", "mm2")
     value, error = answer[f"{measure}_{unit}"], answer[f"{measure}_error_{unit}"]
     error_text = f" +- {100 * error / value:.2g} %" if value else ""
-    how = answer["method"] if answer["method"].startswith("exact") else f"by {answer['method']}"
-    return f"{text}{measure} {value:.6g} {unit}{error_text}\n{render.wrap_text(how)}\n"
+    method_text = answer["method"] if answer["method"].startswith("exact") else f"by {answer['method']}"
+    return f"{text}{measure} {value:.6g} {unit}{error_text}\n{render.wrap_text(method_text)}\n"

@@ -54,7 +54,7 @@ def percent(text: str, option: str) -> float:
     return value / 100
 
 
-def standard_input(max_bytes: int, instead: str = "") -> bytes:
+def standard_input(max_bytes: int, advice: str = "") -> bytes:
     """All of standard input, at most `max_bytes`; instead: advice for a longer one.
 
     Raises FileError if it is closed or cannot be read, UsageError if it is longer.
@@ -68,7 +68,7 @@ def standard_input(max_bytes: int, instead: str = "") -> bytes:
         raise FileError(f"standard input: cannot read: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > max_bytes:
         size = f"{max_bytes // 1_000_000} MB" if max_bytes >= 1_000_000 else f"{max_bytes // 1000} kB"
-        raise UsageError(f"more than {size} on standard input{instead}")
+        raise UsageError(f"more than {size} on standard input{advice}")
     return content
 
 

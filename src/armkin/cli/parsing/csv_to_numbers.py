@@ -111,10 +111,12 @@ class Columns:
         double = [name for name, places in places_of.items() if len(places) > 1]
         if double:
             raise UsageError(f"the heading has two columns {double[0]}")
-        missing = [name for name, places in places_of.items() if not places]
-        if missing:
-            names = ", ".join(missing)
-            raise UsageError(f"the heading has no column{'s' * (len(missing) > 1)} {names}; it has {', '.join(cells)}")
+        missing_names = [name for name, places in places_of.items() if not places]
+        if missing_names:
+            names = ", ".join(missing_names)
+            raise UsageError(
+                f"the heading has no column{'s' * (len(missing_names) > 1)} {names}; it has {', '.join(cells)}"
+            )
         self.heading = cells
         self.places = [places[0] for places in places_of.values()]
         return True
@@ -153,8 +155,8 @@ def _all_rows(
     if columns.skipped:
         output.warn(f"{columns.skipped} row{'s' * (columns.skipped > 1)} without {','.join(names)} skipped")
     if empty:
-        why = "has no row with values" if columns.skipped else "is empty"
-        raise UsageError(f"{name_of(source)} {why}; it needs one row of {','.join(names)} per pose")
+        reason = "has no row with values" if columns.skipped else "is empty"
+        raise UsageError(f"{name_of(source)} {reason}; it needs one row of {','.join(names)} per pose")
 
 
 def streamed_rows(
@@ -217,11 +219,11 @@ def _among_others(rows: list[list[bytes]], width: int, places: list[int]) -> Arr
 
     if any(len(row) != width for row in rows):
         return None
-    chosen = [row[i] for row in rows for i in places]
-    if b"".join(chosen).translate(None, _PLAIN):
+    cells = [row[i] for row in rows for i in places]
+    if b"".join(cells).translate(None, _PLAIN):
         return None
     try:
-        return np.array([float(cell) for cell in chosen]).reshape(len(rows), len(places))
+        return np.array([float(cell) for cell in cells]).reshape(len(rows), len(places))
     except ValueError:
         return None
 
@@ -253,17 +255,17 @@ def _by_arrow(text: bytes, width: int) -> Array | None:
 def text_blocks(file: IO[bytes], source: str) -> Iterator[bytes]:
     """The text in blocks of CHUNK_ROWS lines, each as soon as it can be read; a line of MAX_LINE characters ends it."""
     held: list[bytes] = []
-    lines = open_ = 0  # lines that end in what is held, and characters behind them
+    lines = open_length = 0  # lines that end in what is held, and characters behind them
     while text := _read_available(file, source):
         ends = text.count(b"\n")
         while lines + ends >= CHUNK_ROWS:
             cut = _end_of_lines(text, CHUNK_ROWS - lines)
             yield b"".join([*held, text[:cut]])
             text, ends, held = text[cut:], ends - (CHUNK_ROWS - lines), []
-            lines = open_ = 0
+            lines = open_length = 0
         held.append(text)
-        lines, open_ = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_ + len(text)
-        if open_ >= MAX_LINE:  # no use in reading on
+        lines, open_length = lines + ends, len(text) - text.rfind(b"\n") - 1 if ends else open_length + len(text)
+        if open_length >= MAX_LINE:  # no use in reading on
             break
     if last := b"".join(held):
         yield last
@@ -311,15 +313,19 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
     import numpy as np
 
     index: list[int] = []
-    good: list[list[float]] = []
+    parsed: list[list[float]] = []
     problem: UsageError | None = None
-    begin, number, tried = 0, first, False
+    begin, number, is_tried = 0, first, False
     while begin < len(text):
-        if columns.first_row_read and not tried:  # what the columns are is known: the rest in one go, if it is plain
-            tried, values = True, columns.all_plain(text[begin:])
+        if columns.first_row_read and not is_tried:  # what the columns are is known: the rest in one go, if it is plain
+            is_tried, values = True, columns.all_plain(text[begin:])
             if values is not None:
                 rows_left = range(number, number + len(values))
-                yield Chunk([*index, *rows_left], np.concatenate([good, values])) if good else Chunk(rows_left, values)
+                yield (
+                    Chunk([*index, *rows_left], np.concatenate([parsed, values]))
+                    if parsed
+                    else Chunk(rows_left, values)
+                )
                 return
         end = text.find(b"\n", begin) + 1 or len(text)
         try:
@@ -329,10 +335,10 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
             break
         if row is not None:
             index.append(number)
-            good.append(row)
+            parsed.append(row)
         begin, number = end, number + 1
-    if good:
-        yield Chunk(index, np.array(good))
+    if parsed:
+        yield Chunk(index, np.array(parsed))
     if problem is not None:
         raise problem
 

@@ -58,10 +58,10 @@ def drawing_moves(
     speed = None if feed is None else _bounded_number(feed, "--feed", (1e-3, MAX_NUMBER), "at least 0.001")
     height = 5.0 if lift is None else _bounded_number(lift, "--lift", (0.0, MAX_NUMBER), "at least 0")
     files.protect_input(file)
-    made = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
-    for text in made.notes:
+    moves = drawing(arm, file, zero, task=task, scale=factor, feed=speed, lift=height, grip_by=grip_by)
+    for text in moves.notes:
         output.note(text)
-    return made
+    return moves
 
 
 def _bounded_number(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:

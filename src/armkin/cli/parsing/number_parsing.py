@@ -20,16 +20,16 @@ def number(text: str, name: str, largest: float = MAX_NUMBER) -> float:
     >>> number("-1e3", "q1")
     -1000.0
     """
-    plain = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
-    shown = text if len(text) <= 40 else text[:37] + "..."
-    if len(plain) > _MAX_DIGITS:
-        raise UsageError(f"{name}: '{shown}' is too long for a number", argument=name, value=shown)
-    if not _NUMBER.fullmatch(plain):
-        raise UsageError(f"{name}: {_refusal_reason(plain, shown)}", argument=name, value=shown)
-    value = float(plain)
+    cleaned_text = text.strip().replace("\u2212", "-")  # the minus sign of printed papers
+    short_form = text if len(text) <= 40 else text[:37] + "..."
+    if len(cleaned_text) > _MAX_DIGITS:
+        raise UsageError(f"{name}: '{short_form}' is too long for a number", argument=name, value=short_form)
+    if not _NUMBER.fullmatch(cleaned_text):
+        raise UsageError(f"{name}: {_refusal_reason(cleaned_text, short_form)}", argument=name, value=short_form)
+    value = float(cleaned_text)
     if abs(value) > largest:
-        message = f"{name}: '{shown}' is too large; numbers here go up to {largest:g}"
-        raise UsageError(message, argument=name, value=shown, most=largest)
+        message = f"{name}: '{short_form}' is too large; numbers here go up to {largest:g}"
+        raise UsageError(message, argument=name, value=short_form, most=largest)
     return value
 
 
@@ -90,31 +90,31 @@ def whole_number(text: str, name: str, low: int, high: int) -> int:
     """A whole number within bounds."""
     value = number(text, name, float("inf"))
     if not low <= value <= high or value != int(value):
-        shown = text if len(text) <= 40 else text[:37] + "..."
-        message = f"{name}: '{shown}' must be a whole number from {low} to {high}"
+        short_form = text if len(text) <= 40 else text[:37] + "..."
+        message = f"{name}: '{short_form}' must be a whole number from {low} to {high}"
         raise UsageError(message, argument=name, value=text, least=low, most=high)
     return int(value)
 
 
-def _refusal_reason(number: str, shown: str) -> str:
+def _refusal_reason(number: str, short_form: str) -> str:
     """Why a word is no number, in words: unit, sign, comma or infinity."""
-    bare = number.lower().lstrip("+-")
-    if not bare:
+    unsigned = number.lower().lstrip("+-")
+    if not unsigned:
         return "a number is missing"
-    if bare in NOT_FINITE:
-        return f"'{shown}' is not finite; give a number"
+    if unsigned in NOT_FINITE:
+        return f"'{short_form}' is not finite; give a number"
     for unit in ("mm", "degrees", "deg", "\u00b0", "%"):
-        if bare.endswith(unit) and _NUMBER.fullmatch(bare.removesuffix(unit).strip()):
+        if unsigned.endswith(unit) and _NUMBER.fullmatch(unsigned.removesuffix(unit).strip()):
             value = number[: -len(unit)].strip()
             fixed = f"units are fixed (mm, degrees); write {value}"
-            return f"'{shown}': {f'write {value}, without a sign for its unit' if unit == '%' else fixed}"
+            return f"'{short_form}': {f'write {value}, without a sign for its unit' if unit == '%' else fixed}"
     if (angle := of_pi(number)) is not None:
-        return f"'{shown}': angles are degrees; write {angle:.10g}"
+        return f"'{short_form}': angles are degrees; write {angle:.10g}"
     if _NUMBER.fullmatch(number.rstrip(",")):
-        return f"'{shown}' ends with a comma; write {number.rstrip(',')}"
+        return f"'{short_form}' ends with a comma; write {number.rstrip(',')}"
     if number.count(",") == 1 and _NUMBER.fullmatch(number.replace(",", ".")):
-        return f"'{shown}' is not a number; write {number.replace(',', '.')} with a point"
-    return f"'{shown}' is not a number"
+        return f"'{short_form}' is not a number; write {number.replace(',', '.')} with a point"
+    return f"'{short_form}' is not a number"
 
 
 def of_pi(text: str) -> float | None:

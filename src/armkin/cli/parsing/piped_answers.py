@@ -185,13 +185,13 @@ def _parse_answer(text: str) -> dict[str, Any]:
 def _answer_pose(answer: dict[str, Any]) -> Pose:
     """The pose of an answer: its best branch's joints, or its joints and pulses."""
     if "branches" in answer:
-        best = answer.get("best")
+        best_index = answer.get("best")
         branches = answer["branches"]
-        if best is None:
+        if best_index is None:
             raise NoSolutionError("the answer on standard input has no branch within limits: nothing was moved")
-        if type(best) is not int or not isinstance(branches, list) or not 0 <= best < len(branches):
+        if type(best_index) is not int or not isinstance(branches, list) or not 0 <= best_index < len(branches):
             raise UsageError("the answer on standard input is damaged: its best branch is not there")
-        branch = branches[best]
+        branch = branches[best_index]
         return Pose(_checked_numbers(branch.get("joints") if isinstance(branch, dict) else None), None)
     pulses = answer.get("pulses")
     if pulses is not None and not (isinstance(pulses, list) and all(type(pulse) is int for pulse in pulses)):

@@ -22,16 +22,16 @@ def answer_of(
     request: choose_branch.Request,
     task: Task,
     values: list[float],
-    chosen: choose_branch.Answer,
+    chosen_answer: choose_branch.Answer,
     all_branches: bool,
     turns: bool,
     closest: Closest | None,
 ) -> Ik:
     """The JSON of one target [mm, deg]: its branches, or the closest pose where none is."""
     arm = request.arm
-    listed, best = chosen.branches, chosen.best
+    branches, best_index = chosen_answer.branches, chosen_answer.best
     if not all_branches:
-        listed, best = ([], None) if best is None else ([listed[best]], 0)
+        branches, best_index = ([], None) if best_index is None else ([branches[best_index]], 0)
     head = render.head(arm)
     answer: Ik = {
         "robot": head["robot"],
@@ -41,21 +41,21 @@ def answer_of(
         "target": values,
         "target_labels": list(task.labels),
         "near": request.near_out,
-        "status": chosen.status,
-        "method": chosen.method,
-        "why": chosen.why,
-        "complete": chosen.complete,
+        "status": chosen_answer.status,
+        "method": chosen_answer.method,
+        "why": chosen_answer.why,
+        "complete": chosen_answer.complete,
         "joint_units": units.unit_names(arm),
-        "branch_count": chosen.total,
-        "branches_within_limits": chosen.within_limits,
-        "branches": [_branch_json(request, branch, turns) for branch in listed],
-        "best": best,
+        "branch_count": chosen_answer.total,
+        "branches_within_limits": chosen_answer.within_limits,
+        "branches": [_branch_json(request, branch, turns) for branch in branches],
+        "best": best_index,
         "closest": closest,
-        "free_joints": chosen.free,
+        "free_joints": chosen_answer.free,
     }
     answer.update(render.scene_and_tool(arm))
     if arm.keep_out:
-        answer["branches_free"] = sum(branch.may_be_taken for branch in chosen.branches)
+        answer["branches_free"] = sum(branch.may_be_taken for branch in chosen_answer.branches)
     return answer
 
 
@@ -70,7 +70,7 @@ def nearest_to(
 
 
 def closest_pose(
-    request: choose_branch.Request, goal: Array, chosen: choose_branch.Answer, nearest: NearestPose | None = None
+    request: choose_branch.Request, goal: Array, chosen_answer: choose_branch.Answer, nearest: NearestPose | None = None
 ) -> Closest | None:
     """The nearest pose within limits; branch: the one it is, where it reaches the target by a way not asked for.
 
@@ -79,8 +79,8 @@ def closest_pose(
     from armkin.inverse import choose_branch
 
     arm = request.arm
-    if chosen.branches and chosen.branches[0].within_limits:  # only the branch asked for is outside
-        legal = chosen.branches[0]
+    if chosen_answer.branches and chosen_answer.branches[0].within_limits:  # only the branch asked for is outside
+        legal = chosen_answer.branches[0]
         if legal.hits:
             return None
         answer: Closest = {

@@ -19,12 +19,12 @@ def text(arm: Arm, answer: Ik) -> str:
     goal = render.label_values(answer["target_labels"], answer["target"], label_units(answer["target_labels"]))
     rows = [["", "branch", *headings, "motion", ""]]
     for i, branch in enumerate(answer["branches"]):
-        bad = ", ".join(violation["joint"] for violation in branch["violations"])
+        joints_outside = ", ".join(violation["joint"] for violation in branch["violations"])
         mark = "*" if i == answer["best"] and len(answer["branches"]) > 1 else ""
         notes = [
             _family_text(branch),
             _turned_text(branch["residual_deg"]),
-            f"outside limits: {bad}" if bad else "",
+            f"outside limits: {joints_outside}" if joints_outside else "",
             render.hits_in_words(branch),
         ]
         note = "; ".join(filter(None, notes))
@@ -34,8 +34,8 @@ def text(arm: Arm, answer: Ik) -> str:
     nearest = answer["closest"]
     if nearest and not answer["branches_within_limits"]:
         miss = f"{fixed_text(nearest['distance_mm'])} mm away"
-        if turned := _turned_text(nearest["angle_deg"]):
-            miss += f", {turned}"
+        if turn_text := _turned_text(nearest["angle_deg"]):
+            miss += f", {turn_text}"
         rows.append(["", "closest", *map(fixed_text, nearest["joints"]), "", miss])
     last = len(headings) + 3
     table = f"{render.table(rows, left_aligned=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
@@ -65,5 +65,5 @@ def _summary(answer: Ik) -> str:
         text += f"; free: {', '.join(answer['free_joints'])}"
     if count > len(answer["branches"]):
         text += " (--all-branches lists all)"
-    sure = "no real branch is missing" if answer["complete"] else "there may be more branches"
-    return f"{text}\n" + render.wrap_text(f"solved as {answer['method']} ({answer['why']}): {sure}")
+    completeness = "no real branch is missing" if answer["complete"] else "there may be more branches"
+    return f"{text}\n" + render.wrap_text(f"solved as {answer['method']} ({answer['why']}): {completeness}")

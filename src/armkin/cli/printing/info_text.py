@@ -169,8 +169,8 @@ def _bus_servos(answer: Mapping[str, Any]) -> str:
     for motor in answer["motors"]:
         if motor["kind"] == "bus":
             figures = (short_text(motor["zero"]), short_text(motor["pulses_per_unit"]))
-            way = "inverted" if motor["invert"] else ""
-            rows.append([motor["name"], str(motor["id"]), str(motor["counts"]), *figures, way])
+            direction = "inverted" if motor["invert"] else ""
+            rows.append([motor["name"], str(motor["id"]), str(motor["counts"]), *figures, direction])
     return table(rows, left_aligned=(0, 5)) if len(rows) > 1 else ""
 
 
@@ -209,8 +209,8 @@ def _solver_text(answer: Mapping[str, Any]) -> str:
         offset = f", pitch offset {short_text(answer['pitch_offset'])} deg" if answer["pitch_offset"] else ""
         lines.append(f"  task     {answer['task']}: target {target_text}{offset}")
     if solver := answer["solver"]:
-        sure = "no real branch is missing" if solver["complete"] else "there may be more branches"
-        lines.append(wrap_text(f"{solver['method']} ({solver['why']}): {sure}", "  ik       ", " " * 11))
+        completeness = "no real branch is missing" if solver["complete"] else "there may be more branches"
+        lines.append(wrap_text(f"{solver['method']} ({solver['why']}): {completeness}", "  ik       ", " " * 11))
     if answer["ik_refuses"]:
         lines.append(wrap_text(answer["ik_refuses"], "  ik       ", " " * 11))
     return "\n".join(lines)
@@ -222,8 +222,8 @@ def _keep_outs(answer: Mapping[str, Any]) -> str:
         return ""
     rows = [["body", "radius/mm", ""]]
     rows += [[b["name"], short_text(b["radius_mm"]), "assumed" if b["assumed"] else ""] for b in answer["bodies"]]
-    away = f", {short_text(answer['clearance_mm'])} mm away" if answer["clearance_mm"] else ""
-    lines = [wrap_text(f"{', '.join(answer['keep_out'])}{away}", "  keep out ", " " * 11)]
+    clearance_text = f", {short_text(answer['clearance_mm'])} mm away" if answer["clearance_mm"] else ""
+    lines = [wrap_text(f"{', '.join(answer['keep_out'])}{clearance_text}", "  keep out ", " " * 11)]
     if answer["pairs_left_out"]:
         words = ", ".join(" and ".join(pair) for pair in answer["pairs_left_out"])
         lines.append(wrap_text(f"{words}: they overlap in every posture", "  left out ", " " * 11))
@@ -242,8 +242,8 @@ def _lacks_text(lacks: dict[str, list[str]], add: list[str]) -> str:
     builds_on = {"send": "simulate", "home": "send"}
     lines = []
     for name, words in rows.items():
-        more = ["the same"] if name in builds_on and lacks[builds_on[name]] else []
-        text = f"not yet: {'; '.join(more + words)}" if more or words else "ready"
+        inherited = ["the same"] if name in builds_on and lacks[builds_on[name]] else []
+        text = f"not yet: {'; '.join(inherited + words)}" if inherited or words else "ready"
         lines.append(wrap_text(text, f"  {name:9}", " " * 11))
     if add:
         lines += ["", "  to add, with your arm's figures, for send:", *(f"    {line}" for line in add)]

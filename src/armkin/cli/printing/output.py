@@ -67,8 +67,8 @@ def for_programs(as_json: bool, words: Iterable[str] = ()) -> None:
     _waiting = [] if as_json else None
     parts = {part for word in words for part in (word, word.partition("=")[2])}
     _broken = sorted((part for part in parts if part.strip() and len(f"{part}.".splitlines()) > 1), key=len)[::-1]
-    if (used := sys.modules.get("armkin.files")) is not None:  # `armkin --help` needs no files
-        used.forget_inputs()
+    if (files_module := sys.modules.get("armkin.files")) is not None:  # `armkin --help` needs no files
+        files_module.forget_inputs()
 
 
 def warn(message: str) -> None:

@@ -63,10 +63,10 @@ def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     rows = [["share of", *plan.arm.joint_names]]
     rows += [[key, *(f"{100 * share:.1f} %" for share in shares.values())] for key, shares in answer["limits"].items()]
     lines = ["", render.table(rows), ""]
-    worst = answer["nearest_singularity"]
-    if worst is not None:
-        size = "infinite" if worst["condition"] is None else f"{worst['condition']:.1f}"
-        lines.append(f"nearest to a singularity at {worst['s_mm']:.3f} mm: condition {size}")
+    singularity = answer["nearest_singularity"]
+    if singularity is not None:
+        size = "infinite" if singularity["condition"] is None else f"{singularity['condition']:.1f}"
+        lines.append(f"nearest to a singularity at {singularity['s_mm']:.3f} mm: condition {size}")
     lines += [deviation_text(plan), *wrist_pass_lines(plan)]
     reduced = plan.reduced
     if reduced.count:

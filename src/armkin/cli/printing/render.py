@@ -120,9 +120,9 @@ def row(title: str, names: Sequence[str], values: Sequence[str]) -> str:
                x/mm  y/mm
       tool  110.053   7.5
     """
-    across = table([["", *names], [title, *values]])
-    narrow = max(map(len, across.splitlines())) <= _TERMINAL_COLUMNS
-    return across if narrow else table([[title, ""], *zip(names, values, strict=True)])
+    wide_table = table([["", *names], [title, *values]])
+    fits_terminal = max(map(len, wide_table.splitlines())) <= _TERMINAL_COLUMNS
+    return wide_table if fits_terminal else table([[title, ""], *zip(names, values, strict=True)])
 
 
 def pose_line(arm: Arm, values: Sequence[float]) -> str:
