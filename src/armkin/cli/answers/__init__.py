@@ -1,7 +1,7 @@
 """The JSON of every command: keys, types and what they mean.
 
 shared_keys.py          keys that many answers have, and errors
-pose_answers.py         fk, pulses
+posture_answers.py         fk, pulses
 branch_answers.py       ik
 reach_answers.py        workspace, reach, place
 robot_answers.py        info, robots, export
@@ -48,11 +48,11 @@ from armkin.cli.answers.motion_answers import PathMoved as PathMoved
 from armkin.cli.answers.motion_answers import PathRun as PathRun
 from armkin.cli.answers.motion_answers import Reconfiguration as Reconfiguration
 from armkin.cli.answers.motion_answers import Send as Send
-from armkin.cli.answers.pose_answers import Fk as Fk
-from armkin.cli.answers.pose_answers import Frame as Frame
-from armkin.cli.answers.pose_answers import PulsePositions as PulsePositions
-from armkin.cli.answers.pose_answers import Pulses as Pulses
-from armkin.cli.answers.pose_answers import Rounded as Rounded
+from armkin.cli.answers.posture_answers import Fk as Fk
+from armkin.cli.answers.posture_answers import Frame as Frame
+from armkin.cli.answers.posture_answers import PulsePositions as PulsePositions
+from armkin.cli.answers.posture_answers import Pulses as Pulses
+from armkin.cli.answers.posture_answers import Rounded as Rounded
 from armkin.cli.answers.reach_answers import BestPlace as BestPlace
 from armkin.cli.answers.reach_answers import Place as Place
 from armkin.cli.answers.reach_answers import PlacedRobot as PlacedRobot
