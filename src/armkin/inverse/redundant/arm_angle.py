@@ -173,9 +173,9 @@ class _Samples(NamedTuple):
     psi: Array  # (M, 2 K + 1)
     cost: Array  # (M, 2, 2, 2 K) motion from near
     legal: Bool  # (M, 2, 2, 2 K)
-    up: Bool  # (M, K) whether the last joint grows behind a place
-    between: Bool  # (M, 2, 2, K) legal behind a place
-    point: Bool  # (M, 2, 2, K) legal at a place, and neither before nor behind it
+    rises: Bool  # (M, K) whether the last joint grows behind a place
+    legal_between: Bool  # (M, 2, 2, K) legal behind a place
+    isolated_legal: Bool  # (M, 2, 2, K) legal at a place, and neither before nor behind it
     turned: Array  # (M, 2 K) the last joint, of the first half
 
 
@@ -209,8 +209,8 @@ def _samples(srs: ArmAngle, circles: _Circles, near: Array) -> _Samples:
     source = np.maximum.accumulate(np.where(np.tile(has_length, 2), np.arange(2 * K), -1), axis=1)[:, K:] % K
     rises = np.take_along_axis(rises, source, axis=1)
     legal_cell = np.take_along_axis(legal[..., 1::2], source[:, None, None], axis=3)
-    point = legal[..., ::2] & has_length[:, None, None] & ~legal_cell & ~np.roll(legal_cell, 1, axis=3)
-    return _Samples(psi, cost, legal, rises, legal_cell, point, t[2, 1] - srs.offset[2, 1])
+    isolated = legal[..., ::2] & has_length[:, None, None] & ~legal_cell & ~np.roll(legal_cell, 1, axis=3)
+    return _Samples(psi, cost, legal, rises, legal_cell, isolated, t[2, 1] - srs.offset[2, 1])
 
 
 class Turning(NamedTuple):
@@ -249,38 +249,47 @@ class Turning(NamedTuple):
 
 def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
     """All pieces of circles M, near (M, n); their starts are not filled in."""
-    s = _samples(srs, circles, near)
-    M, K = s.up.shape
-    turns = s.up != np.roll(s.up, 1, axis=1)  # the last joint turns back here
-    of_curves = np.broadcast_to(turns[:, None, None], s.between.shape).reshape(-1, K)
-    legal_cell, point = s.between.reshape(-1, K), s.point.reshape(-1, K)
-    spans = [runs(legal_cell, of_curves), (*np.nonzero(point), np.zeros(point.sum(), np.intp))]
-    circle_half, begin, count = runs(np.ones_like(legal_cell), of_curves)
-    empty = holding_none(legal_cell | point, circle_half, begin, count)
-    spans.append((circle_half[empty], begin[empty], count[empty]))
-    legal = np.repeat([True, True, False], [len(curve) for curve, *_ in spans])
-    curve, first, length = (np.concatenate(column) for column in zip(*spans, strict=True))
-    circle, wrist = curve // 4, curve % 2
-    # the best sample, and how far the last joint turns: between two samples it is monotone
-    costs = np.concatenate([s.cost, np.where(s.legal, s.cost, np.inf)]).reshape(-1, 2 * K)
-    best_sample = best_samples(costs, curve + len(legal_cell) * legal, 2 * first, 2 * length + 1)
-    sign = np.where(np.repeat(s.up, 2, axis=1), 1.0, -1.0)
-    step = np.remainder(sign * (np.roll(s.turned, -1, axis=1) - s.turned), TURN)
-    step[step > TURN - tol.ROUNDING_DISTANCE * 10] = 0.0  # rounding, backwards
-    travel = np.concatenate([np.zeros((M, 1)), np.cumsum(np.tile(step, 2), axis=1)], axis=1)
-    total = travel[circle, 2 * (first + length)] - travel[circle, 2 * first]
-    total[length == K] = np.where(total[length == K] > np.pi, TURN, 0.0)
-    start = s.turned[circle, 2 * first] + np.pi * wrist
-    end = start + np.where(s.up[circle, first], total, -total)
+    samples = _samples(srs, circles, near)
+    M, K = samples.rises.shape
+    curve, begin, count, legal = _spans(samples)
+    circle, first, last = curve // 4, 2 * begin, 2 * (begin + count)
+    start = samples.turned[circle, first] + np.pi * (curve % 2)
+    travel = _travel(samples, circle, first, last)
+    end = start + np.where(samples.rises[circle, begin], travel, -travel)
+    costs = np.concatenate([samples.cost, np.where(samples.legal, samples.cost, np.inf)]).reshape(-1, 2 * K)
+    best = first + best_samples(costs, curve + 4 * M * legal, first, 2 * count + 1)
 
     def psi(sample: Int) -> Array:
-        return np.asarray(s.psi[circle, sample % (2 * K)] + TURN * (sample // (2 * K)))
+        return np.asarray(samples.psi[circle, sample % (2 * K)] + TURN * (sample // (2 * K)))
 
-    best_at = 2 * first + best_sample
     return Pieces(
-        circles.row[circle], circles.half[circle] * 4 + curve % 4, legal,
-        np.minimum(start, end), np.maximum(start, end),
-        psi(2 * first), psi(2 * (first + length)),
-        psi(np.maximum(best_at - 1, 2 * first)), psi(best_at), psi(np.minimum(best_at + 1, 2 * (first + length))),
-        np.zeros((len(curve), srs.arm.n)),
+        row=circles.row[circle], branch=circles.half[circle] * 4 + curve % 4, legal=legal,
+        a=np.minimum(start, end), b=np.maximum(start, end), first=psi(first), last=psi(last),
+        low=psi(np.maximum(best - 1, first)), at=psi(best), high=psi(np.minimum(best + 1, last)),
+        start=np.zeros((len(curve), srs.arm.n)),
     )  # fmt: skip
+
+
+def _spans(samples: _Samples) -> tuple[Int, Int, Int, Bool]:
+    """Spans of curves along which the last joint does not turn back, legal ones and those that hold no legal place: the
+    curves (P,), counted over all (M, 2, 2), their first places, how many samples they are long, and whether legal."""
+    between, isolated = (x.reshape(-1, x.shape[-1]) for x in (samples.legal_between, samples.isolated_legal))
+    turns_back = np.repeat(samples.rises != np.roll(samples.rises, 1, axis=1), 4, axis=0)
+    every = runs(np.ones_like(between), turns_back)
+    empty = holding_none(between | isolated, *every)
+    places = (*np.nonzero(isolated), np.zeros(isolated.sum(), np.intp))
+    parts = [runs(between, turns_back), places, tuple(column[empty] for column in every)]
+    curve, begin, count = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return curve, begin, count, np.arange(len(curve)) < len(curve) - empty.sum()
+
+
+def _travel(samples: _Samples, circle: Int, first: Int, last: Int) -> Array:
+    """How far the last joint turns along spans (P,) of samples, between two of which it is monotone; a turn at most."""
+    sign = np.where(np.repeat(samples.rises, 2, axis=1), 1.0, -1.0)
+    step = np.remainder(sign * (np.roll(samples.turned, -1, axis=1) - samples.turned), TURN)
+    step[step > TURN - tol.ROUNDING_DISTANCE * 10] = 0.0  # rounding, backwards
+    way = np.cumsum(np.tile(step, 2), axis=1)
+    way = np.concatenate([np.zeros((len(way), 1)), way], axis=1)
+    travel = way[circle, last] - way[circle, first]
+    is_round = last - first == step.shape[1]
+    return np.where(is_round, np.where(travel > np.pi, TURN, 0.0), travel)
