@@ -89,30 +89,30 @@ def ik(
         single_solver = one_target.short_way(arm, task)
         if single_solver is not None and (solutions := single_solver.solve(values, near)) is not None:
             return solutions
+    options: dict[str, Any] = {"examine": examine, "workers": workers, "rounding": rounding}
     if (turned := actual_arm(arm)) is not arm:
-        options: dict[str, Any] = {"examine": examine, "workers": workers, "position_first": position_first}
-        s = ik(turned, targets, task, near=_actual_near(arm, near), rounding=rounding, **options)
+        s = ik(turned, targets, task, near=_actual_near(arm, near), position_first=position_first, **options)
         return _as_commanded(arm, s)
     if position_first:
         return minima(ik, arm, task, targets, near)
     if redundant is not None:
         return families(ik, arm, redundant, targets, near, rounding)
-    return solve_by(arm, *solver(arm, task), values, near, single, examine, workers, rounding)
+    return solve_by(arm, *solver(arm, task), values, near, single=single, **options)
 
 
-def solve_by(  # noqa: C901 - the examinations after the closed form, in their order
+def solve_by(
     arm: Arm,
     task: Task,
     geometry: Geometry,
     values: Array,
     near: ArrayLike | None,
+    *,
     single: bool = False,
     examine: bool = True,
     workers: int = 1,
     rounding: ArrayLike | None = None,
 ) -> Solutions:
-    """`ik` by a given solver, for an arm with ratios of 1; single: whether the targets were given in
-    float32."""
+    """`ik` by a given solver, for an arm with ratios of 1; single: whether the targets were given in float32."""
     targets, batch_shape = flat_targets(task, values)
     reference = read_near(arm, near, batch_shape)
     is_shared = reference.ndim == 1 and len(targets) != 1
@@ -131,13 +131,7 @@ def solve_by(  # noqa: C901 - the examinations after the closed form, in their o
         batch, count = _row_by_row(goals, geometry, examine, workers)
     rounded, bounds = target_rounding.of_targets(arm, task, target, (targets, defect), single, rounding, batch_shape)
     if examine:
-        edge = np.flatnonzero((batch.status == Status.BOUNDARY) | (batch.status == Status.SINGULAR))
-        if len(illegal := edge[~batch.within[edge].any(axis=1)]):
-            batch = legal_postures.with_legal_postures(goals, batch, illegal)
-        if bounds.max(initial=0.0) > near_itself.ROUNDED:
-            batch = near_itself.list_near(goals, batch, bounds)
-        if arm.keep_out:
-            batch = legal_postures.with_free_postures(goals, batch)
+        batch = _better_postures(goals, batch, bounds)
     if arm.prismatic.any():
         batch.complete[distance(arm, task, target) > tol.FAR_DISTANCE] = False
     if not geometry.ordered:
@@ -145,6 +139,17 @@ def solve_by(  # noqa: C901 - the examinations after the closed form, in their o
     names = branch_names(arm, task, geometry, count)
     names += tuple(f"branch {i + 1}" for i in range(count, batch.q.shape[1]))
     return as_solutions(goals, reference, batch_shape, batch, rounded, (names, geometry.name, geometry.why))
+
+
+def _better_postures(goals: Goals, batch: Batch, bounds: Array) -> Batch:
+    """The batch with legal postures of self-motions, `near` where it solves its target to within bounds (N,), and
+    postures that hit nothing, where there are such."""
+    edge = np.flatnonzero((batch.status == Status.BOUNDARY) | (batch.status == Status.SINGULAR))
+    if len(illegal := edge[~batch.within[edge].any(axis=1)]):
+        batch = legal_postures.with_legal_postures(goals, batch, illegal)
+    if bounds.max(initial=0.0) > near_itself.ROUNDED:
+        batch = near_itself.list_near(goals, batch, bounds)
+    return legal_postures.with_free_postures(goals, batch) if goals.arm.keep_out else batch
 
 
 def columns(
