@@ -1,7 +1,7 @@
 """The JSON of every command: keys, types and what they mean.
 
 shared_keys.py          keys that many answers have, and errors
-posture_answers.py         fk, pulses
+posture_answers.py      fk, pulses
 branch_answers.py       ik
 reach_answers.py        workspace, reach, place
 robot_answers.py        info, robots, export
