@@ -38,12 +38,8 @@ class Precision(NamedTuple):
 
 ULPS = 128 * 2.0**-23  # relative rounding of a float: a pose of six joints is off by ten to a hundred units
 IN_DOUBLE = Precision(
-    tol.TANGENT_DISCRIMINANT,
-    tol.SHARP_DISCRIMINANT,
-    tol.ONE_ROOT,
-    tol.FREE_AMPLITUDE,
-    tol.NEARLY_FREE_AMPLITUDE,
-    tol.NEARBY**2,
+    *(tol.TANGENT_DISCRIMINANT, tol.SHARP_DISCRIMINANT, tol.ONE_ROOT),
+    *(tol.FREE_AMPLITUDE, tol.NEARLY_FREE_AMPLITUDE, tol.NEARBY**2),
 )
 IN_SINGLE = Precision(ULPS, ULPS**2, ULPS, ULPS**2, 4.0 * ULPS**2, ULPS**2)  # thresholds in single precision
 
@@ -298,9 +294,8 @@ def trig_quadratic(e: list[Entry], scale: Entry, prefer: Pair | None = None) -> 
     pair, _ = linear(lx, ly, -lz, 1, tol.UNDERFLOW_SQUARED, None, disc)
     real = disc > -(tol.TOUCHING_DISTANCE**2) * h2
     root, slope = _on_conic(pair, real, conic)
-    merging = (real & (arrays.absolute(slope) < tol.MERGING_SLOPE)) | (
-        (disc < 0.0) & (-disc < tol.TOUCHING_DISTANCE**2 * h2)
-    )
+    touching = (disc < 0.0) & (-disc < tol.TOUCHING_DISTANCE**2 * h2)
+    merging = (real & (arrays.absolute(slope) < tol.MERGING_SLOPE)) | touching
     free = conic_size * size < tol.NO_SIZE * scale
     return with_preferred(root, free, prefer), Doubt(merging | triple | free, free)
 

@@ -15,31 +15,19 @@ HIGH_ORDER = 1e-4  # smallest singular value of a posture 1e-9 of the reach off 
 
 # ---- what follows from these
 ROUNDING_DISTANCE = ERROR / WEAK  # distance [rad, reaches] of joint values that rounding explains
-STANDING_DISTANCE = (
-    SOLUTION / 100.0
-)  # distance [rad, reaches] of a branch that stands at `near`: `near` solves the target, too
+STANDING_DISTANCE = SOLUTION / 100.0  # distance [rad, reaches] of a branch that stands at `near`, which solves it
 STILL_TURN = SOLUTION / HIGH_ORDER  # difference [rad, reaches] along a self-motion below which it holds a joint still
 MOVED = SOLUTION / WEAK  # share of a component's length below which a joint along it does not move
 DRIFT = 2.0 * MOVED  # movement [rad, reaches] along a self-motion of joints too slow to be called free
 ACCEPTED = 2.5 * ERROR  # residual of a closed form's candidate that needs no correction
-ROUNDING_RESIDUAL = (
-    10.0 * ERROR
-)  # residual of a branch on an edge that needs no correction; growth of a residual that is rounding
+ROUNDING_RESIDUAL = 10.0 * ERROR  # residual of a branch on an edge, or growth of a residual, that is rounding
 EQUAL_RESIDUALS = 0.1 * ERROR  # residual below which two residuals count as equal
-DOUBLE_VALUE = (
-    ERROR**0.5
-)  # singular value below which a root may be double: arithmetic cannot tell its two halves apart
-DOUBLE_DISTANCE = (
-    ERROR**0.25
-)  # distance [rad] by which rounding parts candidates at most: those of a root of fourth order
-FOLD_VALUE = (
-    2.0 * SOLUTION * CURVATURE
-) ** 0.5  # smallest singular value from which on no component holds a turning point
+DOUBLE_VALUE = ERROR**0.5  # singular value below which a root may be double: its two halves cannot be told apart
+DOUBLE_DISTANCE = ERROR**0.25  # distance [rad] by which rounding parts candidates at most: at a root of fourth order
+FOLD_VALUE = (2.0 * SOLUTION * CURVATURE) ** 0.5  # smallest singular value from which on no component turns
 MOVING_VALUE = 2.0 * SOLUTION / REACH  # singular value below which it is asked whether joints can move
 GROWTH = SOLUTION / REACH  # growth of the residual per radian along a self-motion
-CLOSE_DISTANCE = (
-    REACH / 2.0
-)  # distance [rad, reaches] of branches that are one if the posture between them solves the target
+CLOSE_DISTANCE = REACH / 2.0  # distance [rad, reaches] of branches that are one if the posture between them solves
 
 # ---- what is worth correcting
 NEARBY = 1e-6  # residual up to which a closed form's candidate is worth correcting
@@ -53,15 +41,11 @@ LEVEL_CURVATURE = 1e-6  # curvature of 1 - cos(angle) below which a minimum may 
 ONE_MINIMUM = 1e-6  # distance [rad, reaches] of minima, in angle and joints, that are one
 
 # ---- closed forms, relative to the equation's own size
-TANGENT_DISCRIMINANT = (
-    1e-7  # discriminant below which the posture between two roots may solve the target: 3e-4 rad to each
-)
+TANGENT_DISCRIMINANT = 1e-7  # discriminant below which the posture between two roots may solve: 3e-4 rad to each
 SHARP_DISCRIMINANT = 1e-11  # the same of a wrist of right angles: its roots differ by half a turn of its neighbours
 ONE_ROOT = 1e-14  # discriminant below which the middle of two roots misses by less than rounding does
 FREE_AMPLITUDE = 1e-18  # squared amplitude below which an equation says nothing about its angle
-NEARLY_FREE_AMPLITUDE = (
-    1e-11  # squared amplitude below which 0.1 rad may miss by less than `SOLUTION`, at a lever of 3 mm/m
-)
+NEARLY_FREE_AMPLITUDE = 1e-11  # the same where 0.1 rad may miss by less than `SOLUTION`, at a lever of 3 mm/m
 TOUCHING_DISTANCE = 1e-4  # distance of complex roots from the real line that may be a double root seen through rounding
 
 # ---- classes of arms
@@ -75,9 +59,7 @@ BESIDE_END = 1e-3  # distance [rad] from a branch's end to the samples on its si
 BESIDE_CROSSING = 1e-6  # distance [rad] from the crossing of a limit, known but for rounding, to where a secant begins
 NO_ROOM = 1e-13  # size [rad, rad^2] of what is left at a branch's end that counts as nothing
 BEFORE_MERGING = 1e-8  # distance [rad] from where two branches merge to where both are still there
-JOINED_SHARE = (
-    1e-3  # distance of two branches just before they merge, in parts of what lay between them at the last sample
-)
+JOINED_SHARE = 1e-3  # distance of two branches just before they merge, in parts of that at the last sample
 STEADY_VALUE = 0.05  # singular value above which a branch of an arm near a class continues one of the class
 FAR_DISTANCE = 20  # distance [reaches] of a target up to which a sliding arm's branches are known complete
 
@@ -104,9 +86,7 @@ NO_SIZE = 1e-12  # length of a vector or coefficient that has no direction, rela
 NO_LENGTH = 1e-9  # size [mm] of an arm without lengths
 NO_AREA = 1e-9  # determinant of two directions that are one
 NO_COEFFICIENT = 1e-9  # size of a matrix that is zero
-PARALLEL_SINE = (
-    1e-6  # sine between axes up to which a closed form takes them for parallel, cosine for perpendicular ones
-)
+PARALLEL_SINE = 1e-6  # sine between axes up to which closed forms take them for parallel, cosine for perpendicular
 UNDERFLOW = 1e-100  # smallest number whose square is clearly no denormal number
 UNDERFLOW_SQUARED = 1e-140  # amplitude below which `UNDERFLOW` stands alone
 AT_INFINITY = 1e-9  # divisor of a half tangent below which the angle is half a turn
@@ -120,9 +100,7 @@ HELD_DIFFERENCE = 1e-9  # difference [rad, mm] up to which a joint counts as hel
 STEP_VALUE_SQUARED = 1e-10  # square of a singular value from which on a step across a curve uses it
 NO_COST = 1e-18  # difference of two costs that are equal
 EQUAL_COST = 1e-9  # relative difference of two costs that belong to one minimum
-PROBE_SHARE = (
-    1e-6  # share of the way to the next sample of a curve, at which it is asked whether the motion gets shorter
-)
+PROBE_SHARE = 1e-6  # share of the way to a curve's next sample, at which it is asked whether the motion gets shorter
 SAME_SEED = 1e-4  # distance [rad, reaches] of the answer an arc ends at; residual of one worth a correction
 MID_MISS = 1e-4  # error [reaches, rad], at most, of the middle of a cubic that follows a curve of answers
 SHORTEST_ARC = 1e-6  # step [rad, reaches] along a curve of answers, below which the curve is given up
@@ -134,9 +112,7 @@ GAINS_NOTHING = 1e-17  # relative gain in cost of a step that is the last
 PAIRED_PART = 1e-4  # imaginary part [rad] of a double root's halves
 SAME_ROOT = 1e-4  # distance of hidden angles that may be one root
 UPRIGHT = 1e-4  # imaginary part [rad] of a root that was real
-STRAY_DISTANCE = (
-    1e-3  # distance [rad, scaled length] that the pose itself moves a root: one that moves farther is another root
-)
+STRAY_DISTANCE = 1e-3  # distance [rad, scaled length] that the pose moves a root: one that moves farther is another
 SAME_KEY = 1e-5  # distance along a key of answers that may be one
 BLURRED_ROOT = 1e-5  # distance [rad, scaled length] of a guess from its root, above which the root is blurred
 CLOSE_RESIDUAL = 1e-5  # residual of a posture that may yet become an answer
@@ -180,12 +156,8 @@ STALLED_RESIDUAL = 1e-6  # residual from which a step that brings hardly anythin
 ARRIVED_STEP = 1e-9  # step [rad, reaches] that ends Newton's method: its square is below rounding
 SMOOTH_ERROR = 1e-5  # error of polynomials off their curve, at most, as a share of a span
 MIN_COST = 1e-30  # floor of a cost that shares are taken of
-LOOSE_LEVER = (
-    1e-12  # squared length across a joint [1 or reaches] below which it may be free: rounding at a double root
-)
-LOOSE_DOUBLE_LEVER = (
-    1e-9  # squared length, as LOOSE_LEVER, at a root of fourth order, of which rounding leaves the fourth root
-)
+LOOSE_LEVER = 1e-12  # squared length across a joint [1, reaches] below which it may be free: rounding of a double root
+LOOSE_DOUBLE_LEVER = 1e-9  # the same at a root of fourth order, of which rounding leaves the fourth root
 SHAKE_DISTANCE = 1e-4  # distance [reaches, rad] by which a target is moved to where nothing is free
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # way that each pass of an elimination moves the pose
 SLOW_DISTANCE = 1e-3  # distance [rad, scaled length] of candidates that have not converged and take more steps

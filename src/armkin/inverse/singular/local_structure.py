@@ -104,9 +104,8 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
             break
         holds = _follow_spans(arm, task, starts, curve, unknown, BOTH_WAYS)
         # a shorter span helps neither where two directions are all but lost nor where the component leaves this one
-        unknown = unknown[
-            ~curve.known[unknown] & (curve.second[unknown] > tol.HIGH_ORDER) & (is_short[unknown] | ~holds)
-        ]
+        helped = ~curve.known[unknown] & (curve.second[unknown] > tol.HIGH_ORDER)
+        unknown = unknown[helped & (is_short[unknown] | ~holds)]
         span, bend_span = curve.span[unknown], BEND * curve.second[unknown]
         shorter_span = np.where(2.0 * bend_span < span, bend_span, span / SHRINK)
         curve.span[unknown] = np.where(is_short[unknown], full_span[unknown], shorter_span)
