@@ -102,8 +102,8 @@ def _pin_counts(emulated: Emulated) -> list[int]:
 def _connect_and_settle(emulated: Emulated, stop: Callable[[], bool] = lambda: False) -> Backend:
     """Connect the arm, and set the true position if the board has lost it."""
     machine = emulated.board.connect(emulated.line, stop)
-    lost = machine.position() == "lost"
-    machine.prepare(assume=joints(machine.arm, _pin_counts(emulated)) if lost else None)
+    is_lost = machine.position() == "lost"
+    machine.prepare(assume=joints(machine.arm, _pin_counts(emulated)) if is_lost else None)
     return machine
 
 

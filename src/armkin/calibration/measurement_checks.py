@@ -93,7 +93,7 @@ def _check_readings(arm: Arm, rows: Measurements) -> None:
         raise UsageError(f"{hint}; as given, the rows miss the arm by {miss:.3g} mm (median); nothing is written")
 
 
-def _axes_in_place(expected: Array, measured: Array, most: float, largest: float) -> str:
+def _axes_in_place(expected: Array, measured: Array, max_miss: float, largest: float) -> str:
     """The explanation of points (M, 3) that fit after a permutation or a change of sign of axes; "" if none fits.
 
     These readings are tried first and without rigid motions, while `_readings` allows any measuring frame.
@@ -107,7 +107,7 @@ def _axes_in_place(expected: Array, measured: Array, most: float, largest: float
         explanation = f"the measured {axis} looks negative (or the first joint turns the other way)"
         candidates.append((_median_miss(expected, measured * flip), explanation))
     least_miss, explanation = min(candidates)
-    return explanation if least_miss < min(most, largest) else ""
+    return explanation if least_miss < min(max_miss, largest) else ""
 
 
 _FLIPS = (((-1.0, 1.0, 1.0), "x"), ((1.0, -1.0, 1.0), "y"), ((1.0, 1.0, -1.0), "z"))

@@ -108,9 +108,9 @@ def _five_parts(count: int) -> list[NDArray[np.intp]]:
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
 
 
-def _determines_tip(model: Model, candidate: Fit, before: Array) -> bool:
+def _determines_tip(model: Model, candidate: Fit, file_errors: Array) -> bool:
     """Whether the deviation of the tip after the fit is less than OPEN_SHARE times the error of the file."""
-    return tip_deviation(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(before**2)))
+    return tip_deviation(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(file_errors**2)))
 
 
 def _is_clearly_better(errors: Array) -> bool:
@@ -127,5 +127,5 @@ def _is_better(simple: Array, rich: Array, *, first: bool) -> bool:
     a, b = (np.minimum(errors, ERROR_CAP * np.median(errors)) ** 2 for errors in (simple, rich))
     gain = a - b
     chance = float(gain.std(ddof=1) / np.sqrt(len(gain)))
-    share, least = (FIRST_ERROR_SHARE, CERTAIN_GAIN) if first else (1.0, 0.0)
-    return bool(b.mean() <= share * a.mean() and gain.mean() > (least + FEW_ROWS_GAIN / len(gain)) * chance)
+    share, min_gain = (FIRST_ERROR_SHARE, CERTAIN_GAIN) if first else (1.0, 0.0)
+    return bool(b.mean() <= share * a.mean() and gain.mean() > (min_gain + FEW_ROWS_GAIN / len(gain)) * chance)

@@ -84,9 +84,9 @@ def suggest_poses(model: Model, count: int, free_indices: NDArray[np.intp], meas
     for _ in range(count):
         gain = np.linalg.slogdet(np.eye(3) + J @ np.linalg.solve(N, np.swapaxes(J, 1, 2)))[1]
         gain[chosen_numbers] = -np.inf if len(chosen_numbers) < CANDIDATE_COUNT else gain[chosen_numbers]
-        best = int(np.argmax(gain))
-        chosen_numbers.append(best)
-        N = N + J[best].T @ J[best]
+        best_number = int(np.argmax(gain))
+        chosen_numbers.append(best_number)
+        N = N + J[best_number].T @ J[best_number]
     return np.asarray(candidates[chosen_numbers])
 
 

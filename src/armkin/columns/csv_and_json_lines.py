@@ -27,33 +27,33 @@ Lines = Callable[[Table, list[str], Callable[[Any], str], str], bytes]
 def to_csv(table: Table, lines: Lines | None = None) -> bytes:
     """The rows of a table as CSV, without a heading; lines: what prints them, by default what is quickest here."""
     names = list(table)
-    between = ["", *[","] * (len(names) - 1), "\n"]
-    return (lines or _print_lines)(table, between, csv_cell, "")
+    separators = ["", *[","] * (len(names) - 1), "\n"]
+    return (lines or _print_lines)(table, separators, csv_cell, "")
 
 
 def to_json_lines(table: Table, lines: Lines | None = None) -> bytes:
     """The rows of a table as flat JSON objects, one a line."""
-    between = [("{" if i == 0 else ", ") + json.dumps(name) + ": " for i, name in enumerate(table)]
-    return (lines or _print_lines)(table, [*between, "}\n"], json.dumps, "null")
+    separators = [("{" if i == 0 else ", ") + json.dumps(name) + ": " for i, name in enumerate(table)]
+    return (lines or _print_lines)(table, [*separators, "}\n"], json.dumps, "null")
 
 
-def _print_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def _print_lines(table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str) -> bytes:
     """See `Lines`."""
     count = row_count(table)
     if count >= PYARROW_ROWS and (arrow := _import_arrow()) is not None:
         parts = (table if count <= ROWS else take_rows(table, slice(i, i + ROWS)) for i in range(0, count, ROWS))
-        return b"".join([_print_by_arrow(arrow, block, between, quoted, missing) for block in parts])
-    columns = [_column_texts(column, quoted, missing) for column in table.values()]
+        return b"".join([_print_by_arrow(arrow, block, separators, quoted, missing_text) for block in parts])
+    columns = [_column_texts(column, quoted, missing_text) for column in table.values()]
     if not count:
         return b""
-    line = "%s".join(text.replace("%", "%%") for text in between)
+    line = "%s".join(text.replace("%", "%%") for text in separators)
     return "".join([line % row for row in zip(*columns, strict=True)]).encode()
 
 
-def _column_texts(column: Column, quoted: Callable[[Any], str], missing: str) -> list[str]:
+def _column_texts(column: Column, quoted: Callable[[Any], str], missing_text: str) -> list[str]:
     """The texts of a column; missing: what stands for nan."""
     if isinstance(column, Words):
-        names = [*map(quoted, column.names), missing]
+        names = [*map(quoted, column.names), missing_text]
         return [names[i] for i in column.index.tolist()]
     if column.dtype == bool:
         return ["true" if value else "false" for value in column.tolist()]
@@ -61,7 +61,7 @@ def _column_texts(column: Column, quoted: Callable[[Any], str], missing: str) ->
         return list(map(str, column.tolist()))
     texts = list(map(repr, column.tolist()))
     for row in np.flatnonzero(np.isnan(column)).tolist():
-        texts[row] = missing
+        texts[row] = missing_text
     return texts
 
 
@@ -76,23 +76,25 @@ def _import_arrow() -> Any:
     return pyarrow
 
 
-def _print_by_arrow(pa: Any, table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def _print_by_arrow(
+    pa: Any, table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str
+) -> bytes:
     """The rows as bytes, texts joined by Arrow; between: what stands around each column."""
-    pieces = [_arrow_texts(pa, column, quoted, missing) for column in table.values()]
-    if len(set(between[1:-1])) <= 1 and not between[0]:  # one separator: half as many pieces to join
-        lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(between[1]))
-        lines = pa.compute.binary_join_element_wise(lines, pa.scalar(""), pa.scalar(between[-1]))
+    pieces = [_arrow_texts(pa, column, quoted, missing_text) for column in table.values()]
+    if len(set(separators[1:-1])) <= 1 and not separators[0]:  # one separator: half as many pieces to join
+        lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(separators[1]))
+        lines = pa.compute.binary_join_element_wise(lines, pa.scalar(""), pa.scalar(separators[-1]))
     else:
-        every = [piece for pair in zip(map(pa.scalar, between), pieces, strict=False) for piece in pair]
-        lines = pa.compute.binary_join_element_wise(*every, pa.scalar(between[-1]), pa.scalar(""))
+        parts = [piece for pair in zip(map(pa.scalar, separators), pieces, strict=False) for piece in pair]
+        lines = pa.compute.binary_join_element_wise(*parts, pa.scalar(separators[-1]), pa.scalar(""))
     _, offsets, buffer = lines.buffers()
     ends = np.frombuffer(offsets, np.int32, len(lines) + 1, 4 * lines.offset)
     return bytes(memoryview(buffer)[ends[0] : ends[-1]])
 
 
-def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing: str) -> Any:
+def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing_text: str) -> Any:
     if isinstance(column, Words):
-        names = pa.array([*map(quoted, column.names), missing], pa.string())
+        names = pa.array([*map(quoted, column.names), missing_text], pa.string())
         return names.take(pa.array(np.where(column.index < 0, len(column.names), column.index)))
     if column.dtype == bool:
         return pa.array(["false", "true"]).take(pa.array(column.astype(np.int64)))
@@ -100,15 +102,15 @@ def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing:
     texts = pa.array(values).cast(pa.string())
     if values.dtype.kind != "f":
         return texts
-    odd = _needs_python_digits(values)
-    if odd.any():
-        words = [missing if value != value else repr(value) for value in values[odd].tolist()]
-        texts = pa.compute.replace_with_mask(texts, pa.array(odd), pa.array(words, pa.string()))
+    by_python = _needs_python_digits(values)
+    if by_python.any():
+        words = [missing_text if value != value else repr(value) for value in values[by_python].tolist()]
+        texts = pa.compute.replace_with_mask(texts, pa.array(by_python), pa.array(words, pa.string()))
     return texts
 
 
 def _needs_python_digits(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Where pyarrow's digits are not laid out as Python's: 1 for 1.0, 1e-7 for 1e-07, 1e+10 for 10000000000.0, nan."""
     size = np.abs(values)
-    plain = (values != np.rint(values)) & (((size >= 1e-3) & (size < 1e9)) | ((size < 1e-10) & (size > 1e-99)))
-    return np.asarray(~plain)
+    is_plain = (values != np.rint(values)) & (((size >= 1e-3) & (size < 1e9)) | ((size < 1e-10) & (size > 1e-99)))
+    return np.asarray(~is_plain)

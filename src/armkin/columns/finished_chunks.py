@@ -80,13 +80,13 @@ class Parts:
         """Note what is asked, or raise UsageError where the parts on disk belong to another question."""
         place = self.folder / "job.json"
         try:
-            before = json.loads(place.read_text("utf-8"))
+            earlier_job = json.loads(place.read_text("utf-8"))
         except FileNotFoundError:
             self._write(place, json.dumps(self.job).encode())
             return
         except ValueError:
             raise FileError(f"{place}: this is no job of armkin's; remove {self.folder}", file=str(place)) from None
-        differing = [name for name in {**before, **self.job} if before.get(name) != self.job.get(name)]
+        differing = [name for name in {**earlier_job, **self.job} if earlier_job.get(name) != self.job.get(name)]
         if differing:
             names = ", ".join(differing)
             raise UsageError(
@@ -104,13 +104,13 @@ class Parts:
         except FileNotFoundError:
             return None
 
-    def keep(self, number: int, about: Mapping[str, Any], data: bytes) -> None:
+    def keep(self, number: int, record: Mapping[str, Any], data: bytes) -> None:
         """Keep a finished part. Raises UnfinishedError for a full disk: the parts so far stay.
 
         The run that holds the folder may let other processes of this machine keep what they have finished.
         """
         with self._errors():
-            self._write(self._place(number), json.dumps(about).encode() + b"\n", data)
+            self._write(self._place(number), json.dumps(record).encode() + b"\n", data)
 
     def open_parts(self, count: int) -> Iterator[IO[bytes]]:
         """The bytes of the first parts, one file after the other: each is closed when the next is opened."""
@@ -145,16 +145,16 @@ class Parts:
 
     def _write(self, place: Path, *data: bytes) -> None:
         """Write a file whole or not at all."""
-        aside = Path(f"{place}{_UNFINISHED}")
+        unfinished_path = Path(f"{place}{_UNFINISHED}")
         try:
-            with open(aside, "wb") as file:
+            with open(unfinished_path, "wb") as file:
                 file.writelines(data)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(aside, place)
+            os.replace(unfinished_path, place)
         except OSError:
             with suppress(OSError):
-                aside.unlink()
+                unfinished_path.unlink()
             raise
 
     @contextmanager
@@ -163,11 +163,11 @@ class Parts:
         try:
             yield
         except OSError as error:
-            why = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else error.strerror or error
+            reason = "the disk is full" if error.errno in (errno.ENOSPC, errno.EDQUOT) else error.strerror or error
             if not self.folder.exists():
-                raise FileError(f"{self.path}: cannot write: {why}", file=self.path) from None
+                raise FileError(f"{self.path}: cannot write: {reason}", file=self.path) from None
             raise UnfinishedError(
-                f"{self.path}: cannot write: {why}; what is finished stays in {self.path}.parts",
+                f"{self.path}: cannot write: {reason}; what is finished stays in {self.path}.parts",
                 file=self.path,
                 parts=str(self.folder),
             ) from None

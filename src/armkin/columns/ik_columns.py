@@ -41,8 +41,8 @@ def branch_columns(
     targets: Array,
     rows: NDArray[np.integer],
     all_branches: bool,
-    quick: Callable[..., tuple[NDArray[np.intp], Array] | None] | None = None,
-    **more: Any,
+    nearest_in_c: Callable[..., tuple[NDArray[np.intp], Array] | None] | None = None,
+    **options: Any,
 ) -> BranchTable:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; all_branches: not the best alone.
 
@@ -51,7 +51,7 @@ def branch_columns(
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     free_indices = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
-    solutions = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[free_indices], **more)
+    solutions = request.ik(choose_branch.locked_arm(request), targets, request.task, near=near[free_indices], **options)
     q, within_limits = solutions.q, solutions.within_limits
     if request.held:
         values = units.joints_in(arm, [request.held.get(name, 0.0) for name in arm.joint_names])
@@ -63,7 +63,7 @@ def branch_columns(
     for i in range(0, max(len(q), 1), BLOCK_TARGETS):
         block = slice(i, i + BLOCK_TARGETS)
         answers = _Answers(solutions, block, q, within_limits, is_free, near, names)
-        parts.append(_list_branches(request, answers, rows, all_branches, quick))
+        parts.append(_list_branches(request, answers, rows, all_branches, nearest_in_c))
     return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
 
 
@@ -83,7 +83,7 @@ class _Answers(NamedTuple):
 
 
 def _list_branches(
-    request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, quick: Any
+    request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, nearest_in_c: Any
 ) -> BranchTable:
     """Lines of a block of targets: all their branches, or the nearest one; quick: what finds that in C, if it can."""
     solutions, block, scale = answers.solutions, answers.rows, units.joint_scale(request.arm)
@@ -91,7 +91,7 @@ def _list_branches(
     within_limits, is_free = answers.within_limits[block], answers.is_free[block]
     allowed = is_free if request.branch is None else is_free & np.isin(solutions.branch[block], answers.names)
     if all_branches:
-        unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
+        is_unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
         key = np.where(valid, motion.round(EQUAL_DECIMALS), np.inf)
         count = valid.sum(axis=1)
         lines = np.maximum(count, 1)
@@ -102,12 +102,12 @@ def _list_branches(
         motion = motion[target[has_branch], branch]
     else:
         arguments = q, allowed, answers.near, scale
-        best, motion = (quick and quick(*arguments)) or nearest_branches(*arguments)
-        target, has_branch = np.arange(len(best)), best >= 0
-        unsolved, branch, motion = ~has_branch, best[has_branch], motion[has_branch]
-    chosen = target[has_branch], branch
-    values = _Lines(target, has_branch, q[chosen], within_limits[chosen], motion, *chosen)
-    return BranchTable(_branch_table(request, solutions, rows[block], block, values), unsolved)
+        nearest, motion = (nearest_in_c and nearest_in_c(*arguments)) or nearest_branches(*arguments)
+        target, has_branch = np.arange(len(nearest)), nearest >= 0
+        is_unsolved, branch, motion = ~has_branch, nearest[has_branch], motion[has_branch]
+    branch_of_line = target[has_branch], branch
+    values = _Lines(target, has_branch, q[branch_of_line], within_limits[branch_of_line], motion, *branch_of_line)
+    return BranchTable(_branch_table(request, solutions, rows[block], block, values), is_unsolved)
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:
@@ -134,10 +134,12 @@ def _any_column(flags: Bool) -> Bool:
 def _rank_branches(key: Array, valid: Bool, within_limits: Bool, is_free: Bool) -> NDArray[np.intp]:
     """Branches (N, B) in the order of a list: free, with hits, outside limits; equal ones in their old order."""
     rank = np.argsort(key, axis=1, kind="stable")
-    mixed = np.flatnonzero((is_free != valid).any(axis=1))
-    if len(mixed):
-        mixed_within, mixed_free = within_limits[mixed], is_free[mixed]
-        rank[mixed] = np.lexsort((key[mixed], mixed_within & ~mixed_free, ~mixed_within, ~valid[mixed]), axis=-1)
+    mixed_rows = np.flatnonzero((is_free != valid).any(axis=1))
+    if len(mixed_rows):
+        mixed_within, mixed_free = within_limits[mixed_rows], is_free[mixed_rows]
+        rank[mixed_rows] = np.lexsort(
+            (key[mixed_rows], mixed_within & ~mixed_free, ~mixed_within, ~valid[mixed_rows]), axis=-1
+        )
     return rank
 
 

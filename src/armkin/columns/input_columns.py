@@ -34,10 +34,12 @@ def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> li
     """The file's names of the columns wanted."""
     lower = [cell.lower() for cell in heading]
     places_of = {name: column_places(lower, name.lower()) for name in names}
-    missing = [name for name, places_found in places_of.items() if not places_found]
-    if missing:
+    missing_names = [name for name, places_found in places_of.items() if not places_found]
+    if missing_names:
         heading_text = ", ".join(heading[:20])
-        raise UsageError(f"{path} has no column{'s' * (len(missing) > 1)} {', '.join(missing)}; it has {heading_text}")
+        raise UsageError(
+            f"{path} has no column{'s' * (len(missing_names) > 1)} {', '.join(missing_names)}; it has {heading_text}"
+        )
     double = [name for name, places_found in places_of.items() if len(places_found) > 1]
     if double:
         raise UsageError(f"{path} has two columns {double[0]}")
@@ -81,10 +83,10 @@ def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]
     pa = parquet.require_pyarrow()
     try:
         file = pa.parquet.ParquetFile(path)
-        chosen = _wanted_names(path, file.schema_arrow.names, names)
-        for batch in file.iter_batches(batch_size=rows, columns=chosen):
-            columns = [batch.column(name) for name in chosen]
-            for name, column in zip(chosen, columns, strict=True):
+        chosen_names = _wanted_names(path, file.schema_arrow.names, names)
+        for batch in file.iter_batches(batch_size=rows, columns=chosen_names):
+            columns = [batch.column(name) for name in chosen_names]
+            for name, column in zip(chosen_names, columns, strict=True):
                 if not (pa.types.is_floating(column.type) or pa.types.is_integer(column.type)):
                     raise UsageError(f"{path}: {name} is no column of numbers: its type is {column.type}")
             yield np.column_stack(
@@ -96,7 +98,7 @@ def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]
 
 def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
     """Blocks of so many rows of a JSON Lines file: the columns named (N, k)."""
-    chosen: list[str] = []
+    chosen_names: list[str] = []
     try:
         with open(path, encoding="utf-8") as file:
             numbered = ((i, line) for i, line in enumerate(file, 1) if line.strip())
@@ -104,8 +106,8 @@ def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Arr
                 table = []
                 for number, line in lines:
                     row = _row_object(path, number, line)
-                    chosen = chosen or _wanted_names(path, list(row), names)
-                    table.append([_cell_number(path, number, name, row.get(name)) for name in chosen])
+                    chosen_names = chosen_names or _wanted_names(path, list(row), names)
+                    table.append([_cell_number(path, number, name, row.get(name)) for name in chosen_names])
                 yield np.array(table, dtype=float)
     except (OSError, UnicodeDecodeError) as error:
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None

@@ -40,10 +40,10 @@ class Results:
 
     def _shape_views(self) -> None:
         N, B, n = self.N, self.B, self.n
-        q, valid, within = self._memory
+        q, valid, within_limits = self._memory
         self.q: Array = q[: N * B * n].reshape(N, B, n)
         self.valid: Bool = valid[: N * B].reshape(N, B)
-        self.within: Bool = within[: N * B].reshape(N, B)
+        self.within: Bool = within_limits[: N * B].reshape(N, B)
         self.branch: NDArray[np.int8] = self._indices[: N * B].reshape(N, B)
 
     def widen(self, B: int) -> None:
@@ -59,21 +59,21 @@ class Results:
             self._shape_views()
         wide_arrays: list[NDArray[Any]] = [self.q, self.valid, self.within, self.branch]
         pairs = zip(narrow_arrays, wide_arrays, (math.nan, False, False, -1), strict=True)
-        for narrow, wide, empty in pairs:
+        for old, new, empty in pairs:
             # move rows from the end on, so that no row overwrites one that is not moved yet
             for start in reversed(range(0, self.N, BLOCK_ROWS)):
-                rows = narrow[start : start + BLOCK_ROWS].copy()
-                wide[start : start + BLOCK_ROWS, :old_count] = rows
-                wide[start : start + BLOCK_ROWS, old_count:] = empty
+                rows = old[start : start + BLOCK_ROWS].copy()
+                new[start : start + BLOCK_ROWS, :old_count] = rows
+                new[start : start + BLOCK_ROWS, old_count:] = empty
 
     def write(self, rows: slice | NDArray[np.intp], answers: Results | Solutions) -> None:
         """Write some rows, which may need more columns."""
-        within = answers.within if isinstance(answers, Results) else answers.within_limits
+        within_limits = answers.within if isinstance(answers, Results) else answers.within_limits
         B = answers.q.shape[-2]
         self.widen(B)
         self.q[rows, :B], self.q[rows, B:] = answers.q, math.nan
         self.valid[rows, :B], self.valid[rows, B:] = answers.valid, False
-        self.within[rows, :B], self.within[rows, B:] = within, False
+        self.within[rows, :B], self.within[rows, B:] = within_limits, False
         self.branch[rows, :B], self.branch[rows, B:] = answers.branch, -1
         self.status[rows], self.free[rows], self.complete[rows] = answers.status, answers.free, answers.complete
 

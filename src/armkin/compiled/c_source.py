@@ -220,22 +220,22 @@ def _choose_code(arm: Arm, branches: int) -> str:
     for joint in range(arm.n):
         lower, upper = (number_text(float(limit[joint])) for limit in (arm.lower, arm.upper))
         value = f"q[(b * {arm.n} + {joint}) * ARM_LANES + i]"
-        close = f"near[{joint} * ARM_LANES + i]"
+        near_value = f"near[{joint} * ARM_LANES + i]"
         if arm.prismatic[joint]:
             loops.append(
                 _in_every_lane(f"in[i] &= ({value} >= {lower} - ARM_SLACK) & ({value} <= {upper} + ARM_SLACK);")
             )
             continue
-        copied = _in_every_lane(f"{value} = arm_copy({value}, {close}, {lower}, {upper}, &in[i]);")
+        copied = _in_every_lane(f"{value} = arm_copy({value}, {near_value}, {lower}, {upper}, &in[i]);")
         if arm.lower[joint] >= -math.pi and arm.upper[joint] <= math.pi:
             loops.append(copied)
             continue
         # usually all values within half a turn of `near` are legal, and so is the nearest copy
-        nearest = _in_every_lane(f"{value} = arm_nearest({value}, {close});")
+        nearest = _in_every_lane(f"{value} = arm_nearest({value}, {near_value});")
         positive = _in_every_lane(f"{value} = arm_principal({value});")
         range_test = f"arm_wide(near + {joint} * ARM_LANES, {lower}, {upper}, count)"
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, nearest, positive), strict=True)
-        loops.append(f"wide = {range_test};\n" + " ".join(f"{when} {{\n{loop}\n}}" for when, loop in choices))
+        loops.append(f"wide = {range_test};\n" + " ".join(f"{condition} {{\n{loop}\n}}" for condition, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
     return f"""{_part_text("half_turn_in_limits")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,

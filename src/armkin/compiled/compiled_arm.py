@@ -155,8 +155,10 @@ class CompiledArm:
     ) -> Solutions:
         """Solutions for a calibrated arm, computed in actual joint values."""
         inner = compile(library.turned, library.name)
-        close = solve._actual_near(self.arm, near)
-        return solve._as_commanded(self.arm, inner.ik(targets, library.name, close, workers=workers, rounding=rounding))
+        near_q = solve._actual_near(self.arm, near)
+        return solve._as_commanded(
+            self.arm, inner.ik(targets, library.name, near_q, workers=workers, rounding=rounding)
+        )
 
     def _any_library(self) -> CompiledTask:
         """Any library, as all contain the chain."""
@@ -170,7 +172,9 @@ class CompiledArm:
                 library = self._tasks.get(task)
                 if library is None:
                     name = task or self.arm.task or default_task(self.arm)
-                    candidates = (built for built in self._tasks.values() if built.branches and built.task.name == name)
+                    candidates = (
+                        solver for solver in self._tasks.values() if solver.branches and solver.task.name == name
+                    )
                     library = self._tasks[task] = next(candidates, None) or CompiledTask(self.arm, task)
         return library
 

@@ -104,11 +104,11 @@ class CompiledTask:
             batch = solve_all(target, near_rows, workers, read=True)
             assert batch is not None
         single = arrays.is_single(targets)
-        shown = array.reshape(target.shape), rounding
-        rounding, least = target_rounding.of_targets(self.arm, self.task, target, shown, single, stated, lead)
-        rows = near_itself.solved_by_near(self.arm, self.task, target, near_rows, least)
+        printed = array.reshape(target.shape), rounding
+        rounding, tolerance = target_rounding.of_targets(self.arm, self.task, target, printed, single, stated, lead)
+        rows = near_itself.solved_by_near(self.arm, self.task, target, near_rows, tolerance)
         if len(rows):
-            self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), least - SOLUTION)
+            self._solve_by_python(batch, rows, target, near_rows.reshape(-1, self.n), tolerance - SOLUTION)
         self._finish(batch, target)
         target = target.copy() if np.may_share_memory(target, array) else target  # the caller may change its arrays
         near_array = near_array.copy()
@@ -199,20 +199,21 @@ class CompiledTask:
         in_c = np.zeros(len(rows), bool) if elimination is None else elimination.is_complete(target[rows])
         for part, geometry in ((rows[in_c], elimination and elimination.geometry), (rows[~in_c], self.geometry)):
             if len(part) and geometry:
-                close, of_rows = near[part] if len(near) > 1 else near[0], None if rounding is None else rounding[part]
-                batch.write(part, solve.solve_by(self.arm, self.task, geometry, target[part], close, rounding=of_rows))
+                near_q, of_rows = near[part] if len(near) > 1 else near[0], None if rounding is None else rounding[part]
+                batch.write(part, solve.solve_by(self.arm, self.task, geometry, target[part], near_q, rounding=of_rows))
 
     def _place_branches(self, batch: Results, target: Array) -> None:
         """Sort and number branches from C as the class that names them does."""
         assert self.geometry.places is not None
-        solved = np.flatnonzero(batch.state == 0)
-        width = int(batch.valid[solved].sum(axis=1).max(initial=0))  # branches are in the first columns
-        q, valid, within = batch.q[solved, :width], batch.valid[solved, :width], batch.within[solved, :width]
-        branch = self.geometry.places(q, target[solved])
+        solved_rows = np.flatnonzero(batch.state == 0)
+        width = int(batch.valid[solved_rows].sum(axis=1).max(initial=0))  # branches are in the first columns
+        q, valid = batch.q[solved_rows, :width], batch.valid[solved_rows, :width]
+        within_limits = batch.within[solved_rows, :width]
+        branch = self.geometry.places(q, target[solved_rows])
         order = np.argsort(np.where(valid, branch, np.iinfo(np.int8).max), axis=1, kind="stable")
-        batch.q[solved, :width] = np.take_along_axis(q, order[:, :, None], axis=1)
-        for values, found_values in ((batch.within, within), (batch.branch, branch)):
-            values[solved, :width] = np.take_along_axis(found_values, order, axis=1)
+        batch.q[solved_rows, :width] = np.take_along_axis(q, order[:, :, None], axis=1)
+        for values, found_values in ((batch.within, within_limits), (batch.branch, branch)):
+            values[solved_rows, :width] = np.take_along_axis(found_values, order, axis=1)
 
     def _solve_blocks(self, target: Array, near: Array, workers: int, *, read: bool) -> Results | None:
         """Results of `_solve_rows` for an elimination, in blocks without unused columns."""

@@ -43,8 +43,8 @@ class JointFunctions:
         values = forward.as_joints(self.arm, q)
         if self._clearances is None or not np.isfinite(values).all():
             return clearance(self.arm, values)
-        least = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
-        return name_clearances(self.arm, least[:, 0], least[:, 1].astype(np.intp), values.shape[:-1])
+        pairs = self._run(self._clearances, least_clearances, (2,), values, 1).reshape(-1, 2)
+        return name_clearances(self.arm, pairs[:, 0], pairs[:, 1].astype(np.intp), values.shape[:-1])
 
     def _run(
         self, call: Any, python: Callable[[Arm, Array], Array], shape: tuple[int, ...], q: ArrayLike, workers: int

@@ -72,8 +72,10 @@ class Single:
         """Slices of q, valid, within, branch and free for `rows` branches, with the shape of q, and shared fields."""
         n, B, first = self._n, self._branches, self._bytes
         masks = [slice(start, start + rows) for start in (first, first + B, first + 2 * B)]
-        same = self._shared_fields if self._names is None else {**self._shared_fields, "names": self._names(rows)}
-        self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(first + 3 * B, first + 3 * B + n), same
+        shared_fields = (
+            self._shared_fields if self._names is None else {**self._shared_fields, "names": self._names(rows)}
+        )
+        self._cuts[rows] = slice(0, rows * n), (rows, n), *masks, slice(first + 3 * B, first + 3 * B + n), shared_fields
         return self._cuts[rows]
 
     def solve(self, target: Array, near: Array | None) -> Solutions | None:
@@ -95,7 +97,7 @@ class Single:
         flags, rows = values.view(_BOOL), self._branches
         if self._names is not None:
             rows = int(flags[self._bytes : self._bytes + rows].sum())
-        q, shape, valid, within, branch, free, shared_fields = self._cuts.get(rows) or self._split_block(rows)
+        q, shape, valid, within_part, branch, free, shared_fields = self._cuts.get(rows) or self._split_block(rows)
         solutions = Solutions.__new__(Solutions)  # the constructor of a frozen class would take two microseconds
         solutions.__dict__.update(
             shared_fields,
@@ -103,7 +105,7 @@ class Single:
             near=near_values,
             q=values[q].reshape(shape),
             valid=flags[valid],
-            within_limits=flags[within],
+            within_limits=flags[within_part],
             branch=values.view(_INT8)[branch],
             free=flags[free],
             status=_STATUS[state],

@@ -19,16 +19,17 @@ SPARE_CHARACTERS = 64  # characters that C may write after the last one
 BLOCK_ROWS = 4_096  # rows printed together, so that their text fits the cache
 
 
-def table_lines(table: Table, between: list[str], quoted: Callable[[Any], str], missing: str) -> bytes:
+def table_lines(table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str) -> bytes:
     """See `armkin.columns.csv_and_json_lines.Lines`."""
     count = row_count(table)
     print_rows = _library()
     texts = [_column_words(column, quoted) for column in table.values()]
-    cells = [[before, missing, *cell] for before, cell in zip(between, texts, strict=False)] + [[between[-1]]]
+    cells = [[separator, missing_text, *cell] for separator, cell in zip(separators, texts, strict=False)]
+    cells.append([separators[-1]])
     encoded = [text.encode() for parts in cells for text in parts]
     ends = np.cumsum([0, *map(len, encoded)], dtype=np.int64)
     cell_starts = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
-    width = sum(map(len, between)) + len(table) * max(MAX_WIDTH, *map(len, encoded))
+    width = sum(map(len, separators)) + len(table) * max(MAX_WIDTH, *map(len, encoded))
     words, buffer = b"".join(encoded), np.empty(min(count, BLOCK_ROWS) * width + SPARE_CHARACTERS, np.uint8)
     printed = []
     for start in range(0, count, BLOCK_ROWS):

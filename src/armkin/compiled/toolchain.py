@@ -41,12 +41,12 @@ def compiler_command() -> list[str]:
 
     Raises MissingExtraError if there is none.
     """
-    named = os.environ.get("CC", "").strip()
-    for words in [_command_words(named)] if named else [["cc"], ["gcc"], ["clang"]]:
+    command = os.environ.get("CC", "").strip()
+    for words in [_command_words(command)] if command else [["cc"], ["gcc"], ["clang"]]:
         if (path := shutil.which(words[0])) is not None:
             return [path, *words[1:]]
-    if named:
-        raise MissingExtraError(f"CC names the C compiler '{named}', which is not there; unset CC, or install it")
+    if command:
+        raise MissingExtraError(f"CC names the C compiler '{command}', which is not there; unset CC, or install it")
     raise MissingExtraError(
         "a C compiler is needed and none is installed: "
         "apt install gcc libc6-dev (Debian, Ubuntu), dnf install gcc (Fedora), xcode-select --install (macOS)"
@@ -82,12 +82,12 @@ def load_library(source: str, content: str, level: int = 3) -> ctypes.CDLL:
     announce()
     try:
         with tempfile.TemporaryDirectory(prefix="armkin-") as build_folder:
-            built, name = _build(commands, source, Path(build_folder))
+            library_path, name = _build(commands, source, Path(build_folder))
             if folder is not None:
-                _store_library(built, folder, name)
+                _store_library(library_path, folder, name)
                 if (library := _stored_library(folder, name, content)) is not None:
                     return library
-            return ctypes.CDLL(str(built))
+            return ctypes.CDLL(str(library_path))
     except OSError as error:  # a full disk, or a folder without execution rights
         raise FileError(
             f"no place to build the arm's code: {error}; TMPDIR may name a folder with room whose programs may run"
@@ -128,9 +128,9 @@ def _run_compiler(
         raise MissingExtraError(f"the C compiler {words[0]} cannot be run: {error.strerror or error}") from None
 
 
-def _store_library(built: Path, folder: Path, name: str) -> None:
+def _store_library(library_path: Path, folder: Path, name: str) -> None:
     """Put a complete library into the cache; on a full disk nothing is stored."""
-    content = built.read_bytes()
+    content = library_path.read_bytes()
     with suppress(OSError):
         handle, temporary = tempfile.mkstemp(prefix=".build-", dir=folder)
         try:

@@ -82,8 +82,8 @@ def _connect(address: str) -> Any:
     try:
         return distributed.Client(address, timeout=SECONDS, set_as_default=False)
     except Exception as error:  # whatever comes of what another program answers: MemoryError of a length in its bytes
-        why = "what answers there is no Dask scheduler" if isinstance(error, MemoryError) else str(error)
-        raise _no_scheduler(address, why.partition("\n")[0] or type(error).__name__) from None
+        reason = "what answers there is no Dask scheduler" if isinstance(error, MemoryError) else str(error)
+        raise _no_scheduler(address, reason.partition("\n")[0] or type(error).__name__) from None
 
 
 def _check_reached(address: str) -> None:
@@ -97,8 +97,8 @@ def _check_reached(address: str) -> None:
     except UnicodeError:  # an empty part between two dots, or one above 63 characters
         raise _no_scheduler(address, f"{host} is no name of a computer") from None
     except OSError as error:
-        why = f"no connection in {REACHED:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
-        raise _no_scheduler(address, why) from None
+        reason = f"no connection in {REACHED:g} s" if isinstance(error, TimeoutError) else error.strerror or str(error)
+        raise _no_scheduler(address, reason) from None
 
 
 def _no_scheduler(address: str, reason: str) -> ClusterError:
@@ -116,11 +116,11 @@ def _check_workers(client: Any, address: str) -> None:
         ) from None
     except Exception as error:
         raise ClusterError(f"{address}: a worker has no armkin of this version: {error}", address=address) from None
-    own = versions()
+    own_versions = versions()
     for worker, of_worker in of_workers.items():
-        differing = [name for name in own if own[name] != of_worker.get(name)]
+        differing = [name for name in own_versions if own_versions[name] != of_worker.get(name)]
         if differing:
-            differences = ", ".join(f"{name} {of_worker.get(name)} (here {own[name]})" for name in differing)
+            differences = ", ".join(f"{name} {of_worker.get(name)} (here {own_versions[name]})" for name in differing)
             raise ClusterError(f"{address}: worker {worker} has {differences}", address=address)
 
 

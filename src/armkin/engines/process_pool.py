@@ -29,7 +29,7 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
     """See `armkin.engines.ordered_chunks.in_order`."""
     source = iter(chunks)
     waiting: deque[tuple[Chunk, Future[Result]]] = deque()
-    pool, lost = _start_pool(workers, work, job), 0
+    pool, lost_times = _start_pool(workers, work, job), 0
     try:
         while True:
             while len(waiting) < CHUNKS_AHEAD * workers and (next_chunk := next(source, waiting)) is not waiting:
@@ -39,15 +39,15 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
             try:
                 answer = waiting[0][1].result()
             except BrokenProcessPool:
-                lost += 1
-                if lost > PATIENCE:
-                    why = f"the process of the same chunk has ended {lost} times: out of memory?"
-                    raise ClusterError(why) from None
+                lost_times += 1
+                if lost_times > PATIENCE:
+                    message = f"the process of the same chunk has ended {lost_times} times: out of memory?"
+                    raise ClusterError(message) from None
                 pool.shutdown(wait=True, cancel_futures=True)
                 pool = _start_pool(workers, work, job)
                 waiting = deque((chunk, _submit(pool, chunk)) for chunk, _ in waiting)
                 continue
-            lost = 0
+            lost_times = 0
             waiting.popleft()
             yield answer
     finally:
@@ -72,9 +72,9 @@ def _submit(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
     try:
         return pool.submit(_run_chunk, chunk)
     except BrokenProcessPool as error:
-        lost: Future[Any] = Future()
-        lost.set_exception(error)
-        return lost
+        failed: Future[Any] = Future()
+        failed.set_exception(error)
+        return failed
 
 
 def _begin_worker(work: Callable[[Any, Any], Any], job: Any) -> None:

@@ -32,8 +32,8 @@ def write_image(
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     except OSError as error:
         raise LinkError(f"avrdude does not start: {error.strerror}") from None
-    late = threading.Timer(_MAX_SECONDS, process.kill)
-    late.start()
+    timer = threading.Timer(_MAX_SECONDS, process.kill)
+    timer.start()
     with process:
         try:
             text = _read_output(process, tick)
@@ -41,15 +41,15 @@ def write_image(
             process.kill()
             raise
         finally:
-            in_time = late.is_alive()
-            late.cancel()
+            in_time = timer.is_alive()
+            timer.cancel()
     if not in_time:
         raise LinkError(f"avrdude did not end within {_MAX_SECONDS:.0f} s")
     if process.returncode:
         lines = [line for line in text.splitlines() if line.strip() and "#" not in line]
         complaints = [line for line in lines if "rror" in line and "ioctl" not in line]
-        why = (complaints or lines[-1:] or ["it failed"])[0]
-        raise LinkError(f"avrdude: {why.removeprefix('avrdude').lstrip(': ')}")
+        complaint = (complaints or lines[-1:] or ["it failed"])[0]
+        raise LinkError(f"avrdude: {complaint.removeprefix('avrdude').lstrip(': ')}")
 
 
 def _read_output(process: subprocess.Popen[bytes], tick: Callable[[float], None]) -> str:

@@ -20,9 +20,9 @@ class Stk500v1:
     def __init__(self, port: Port) -> None:
         self._port = port
 
-    def answers(self, until: float) -> bool:
+    def answers(self, deadline: float) -> bool:
         """Whether it answers before that moment of the monotonic clock."""
-        while time.monotonic() < until:
+        while time.monotonic() < deadline:
             self._port.read(0.0)  # what an answer too late, or a program, has left there
             self._port.write(bytes([_SYNC, _END]))
             # It flashes a lamp for 0.4 s first, with room for two bytes: more would be heard in part, and end it.
@@ -59,7 +59,7 @@ class Stk500v1:
         return answer[1:-1]
 
     def _take(self, count: int, timeout: float) -> bytes:
-        end, taken = time.monotonic() + timeout, b""
-        while len(taken) < count and (left := end - time.monotonic()) > 0:
-            taken += self._port.read(left)
-        return taken
+        end, received = time.monotonic() + timeout, b""
+        while len(received) < count and (left := end - time.monotonic()) > 0:
+            received += self._port.read(left)
+        return received

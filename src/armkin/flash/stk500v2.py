@@ -25,9 +25,9 @@ class Stk500v2:
         self._port = port
         self._number = 0
 
-    def answers(self, until: float) -> bool:
+    def answers(self, deadline: float) -> bool:
         """Whether it answers before that moment of the monotonic clock."""
-        while time.monotonic() < until:
+        while time.monotonic() < deadline:
             try:
                 self._ask(bytes([_SIGN_ON]), 0.2)
             except LinkError:
@@ -63,15 +63,15 @@ class Stk500v2:
         self._number = (self._number + 1) & 255
         message = bytes([_START, self._number, *len(body).to_bytes(2, "big"), _TOKEN]) + body
         self._port.write(message + bytes([reduce(xor, message)]))
-        end, taken = time.monotonic() + timeout, b""
+        end, reply = time.monotonic() + timeout, b""
         while (left := end - time.monotonic()) > 0:
-            taken += self._port.read(left)
-            taken = taken[max(taken.find(bytes([_START, self._number])), 0) :]  # what a program has said before
-            size = 6 + int.from_bytes(taken[2:4], "big")
-            if len(taken) >= size and taken[:2] == bytes([_START, self._number]):
+            reply += self._port.read(left)
+            reply = reply[max(reply.find(bytes([_START, self._number])), 0) :]  # what a program has said before
+            size = 6 + int.from_bytes(reply[2:4], "big")
+            if len(reply) >= size and reply[:2] == bytes([_START, self._number]):
                 break
         else:
-            raise LinkError(f"the boot loader answered {taken[:40].hex(' ') or 'nothing'}")
-        if reduce(xor, taken[:size]) or taken[5] != body[0] or taken[6]:
-            raise LinkError(f"the boot loader answered {taken[:40].hex(' ')}")
-        return taken[7 : size - 1]
+            raise LinkError(f"the boot loader answered {reply[:40].hex(' ') or 'nothing'}")
+        if reduce(xor, reply[:size]) or reply[5] != body[0] or reply[6]:
+            raise LinkError(f"the boot loader answered {reply[:40].hex(' ')}")
+        return reply[7 : size - 1]

@@ -122,23 +122,23 @@ def validate_path(data: dict[str, Any], name: str = "path") -> PathFile:
 
 def check_robot(file: PathFile, name: str, robot_file: str | None) -> None:
     """Raise PathFileError if a path says that it is of another robot than this, by its name or its file."""
-    stated = file.robot
+    named_robot = file.robot
     if (
-        stated is None
-        or stated in (name, robot_file)
-        or (robot_file is not None and _is_same_robot(stated, robot_file, file.folder))
+        named_robot is None
+        or named_robot in (name, robot_file)
+        or (robot_file is not None and _is_same_robot(named_robot, robot_file, file.folder))
     ):
         return
     raise PathFileError(
-        f"{file.place('robot')}: this is a path of {stated}, and the arm is {name}; plan it for {stated}, "
+        f"{file.place('robot')}: this is a path of {named_robot}, and the arm is {name}; plan it for {named_robot}, "
         f"or write robot: {name} if it is meant for this arm",
         robot=name,
     )
 
 
-def _is_same_robot(stated: str, robot_file: str, folder: str) -> bool:
+def _is_same_robot(named_robot: str, robot_file: str, folder: str) -> bool:
     """Whether a shipped robot's name, or a file's as seen from here or from the path's folder, is the robot file."""
-    for robot in (stated, os.path.join(folder, stated)):
+    for robot in (named_robot, os.path.join(folder, named_robot)):
         with suppress(OSError, ValueError, FileError):
             if os.path.samefile(catalogue.locate(robot), catalogue.locate(robot_file)):
                 return True

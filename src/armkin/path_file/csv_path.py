@@ -104,16 +104,16 @@ def _numbers_by_column(header: list[str] | None, row: list[str], line: tuple[str
 
 def _row_to_move(header: list[str] | None, row: list[str], *, first: bool, line: tuple[str, int]) -> Move:
     """The move of a row: joint values, or a target by a point or a line."""
-    named = _numbers_by_column(header, row, line)
-    extra: dict[str, Any] = {key: named.pop(key) for key in _OPTIONS if key in named}
+    numbers = _numbers_by_column(header, row, line)
+    extra: dict[str, Any] = {key: numbers.pop(key) for key in _OPTIONS if key in numbers}
     if extra.get("blend", 0.0) < 0 or extra.get("tool_speed", 1.0) < MIN_TOOL_SPEED:
         raise PathFileError(
             f"{line[0]}:{line[1]}: blend is at least 0, tool_speed at least {MIN_TOOL_SPEED:g} mm/s", file=line[0]
         )
-    if header and not set(named) & set(_TARGETS):
-        return Move.model_construct(None, joint=named, **extra)
+    if header and not set(numbers) & set(_TARGETS):
+        return Move.model_construct(None, joint=numbers, **extra)
     # The header's order is kept; the planner puts a target's labels in place.
-    target = [named[key] for key in sorted(named, key=_column_rank)] if header else list(named.values())
+    target = [numbers[key] for key in sorted(numbers, key=_column_rank)] if header else list(numbers.values())
     return Move.model_construct(None, **{"point" if first else "line": target}, **extra)
 
 

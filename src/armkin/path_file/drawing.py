@@ -97,11 +97,13 @@ class Pen:
             return
         base = [x - o for x, o in zip(a, radial, strict=True)]
         if abs(rise) < _NO_ARC and abs(angle) < _THREE_POINTS:
-            across = cross(normal, (radial[0], radial[1], radial[2]))
+            tangent = cross(normal, (radial[0], radial[1], radial[2]))
             end = math.dist(base, b)  # it may differ a little from the radius at the start
-            half, mean = angle / 2, (radius + end) / 2 / radius
-            ways = [math.cos(half) * o + math.sin(half) * w for o, w in zip(radial, across, strict=True)]
-            via = [c + mean * way for c, way in zip(base, ways, strict=True)]
+            half_angle, mean = angle / 2, (radius + end) / 2 / radius
+            offsets = [
+                math.cos(half_angle) * o + math.sin(half_angle) * w for o, w in zip(radial, tangent, strict=True)
+            ]
+            via = [c + mean * offset for c, offset in zip(base, offsets, strict=True)]
             three_points = Arc.model_construct(via=self.placing.point(via), to=self.placing.point(b))
             self._add(Move.model_construct({"arc"}, arc=three_points, **_speed_key(speed)), line)
             return
@@ -139,8 +141,8 @@ class Pen:
         if not any(move.kind in ("polyline", "arc", "circle") for move in self.moves):
             last = max(len(raw.splitlines()), 1)
             raise PathFileError(f"{name}:{last}: draws nothing up to here: {expected}", file=name, line=last)
-        for drawn in self._drawn:
-            drawn[:] = self.placing.points(drawn)
+        for points in self._drawn:
+            points[:] = self.placing.points(points)
         lines: dict[tuple[str | int, ...], int] = {("moves", k): line for k, line in enumerate(self.lines)}
-        made = PathFile.model_construct(moves=self.moves, corners="tolerance")
-        return made.read_from(Source(name, lines, notes=tuple(notes)))
+        path_file = PathFile.model_construct(moves=self.moves, corners="tolerance")
+        return path_file.read_from(Source(name, lines, notes=tuple(notes)))

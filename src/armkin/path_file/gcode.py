@@ -73,8 +73,8 @@ class _Program:
         for self.line, text in program:
             if self.pen.points > MAX_POINTS:
                 raise self._error(f"is behind {MAX_POINTS} points, and a path has no more: give the program in parts")
-            plain = PLAIN.fullmatch(text)
-            if plain is not None and self._plain_line(*plain.groups()):
+            plain_match = PLAIN.fullmatch(text)
+            if plain_match is not None and self._plain_line(*plain_match.groups()):
                 continue
             self.words = words_of(text, self.name, self.line)
             if self._do_line():
@@ -171,16 +171,16 @@ class _Program:
 
     def _switch(self, code: float, speed: float | None) -> None:
         """An M word: the gripper's, or ignored."""
-        grip_word, close = self.options.grip_by, None
+        grip_word, closes = self.options.grip_by, None
         if grip_word == "M3" and code in (3.0, 4.0, 5.0):
-            close = code != 5.0
+            closes = code != 5.0
         elif grip_word == "M106" and code in (106.0, 107.0):
-            close = code == 106.0 and speed != 0
-        if close is None:
+            closes = code == 106.0 and speed != 0
+        if closes is None:
             self._ignore(f"M{code:g}")
-        elif close != self.held:
-            self.held = close
-            self.pen.grip("closed" if close else "open", self.line)
+        elif closes != self.held:
+            self.held = closes
+            self.pen.grip("closed" if closes else "open", self.line)
 
     def _dwell(self, values: dict[str, float], seconds: float | None) -> None:
         """G4 with P or S, both in seconds."""

@@ -22,7 +22,7 @@ def arc(
 
     plane: its two axes, and the one across; unit: [mm]. Raises ArcError.
     """
-    x, y, across = plane
+    x, y, normal_axis = plane
     sense = _sense(word)
     turns = values.pop("P", 1.0)
     if turns != int(turns) or not 1 <= turns <= 1000:
@@ -34,9 +34,9 @@ def arc(
     centre = _equalised_centre(plane, centre, a, b, miss)
     u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
     angle = sense * (math.atan2(v[1], v[0]) - math.atan2(u[1], u[0])) % (2 * math.pi)
-    same = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
-    angle = 2 * math.pi if same or angle < 1e-12 else angle
-    normal = (float(across == 0), float(across == 1), float(across == 2))
+    is_circle = math.hypot(a[x] - b[x], a[y] - b[y]) < 1e-9 * max(radius, 1.0)
+    angle = 2 * math.pi if is_circle or angle < 1e-12 else angle
+    normal = (float(normal_axis == 0), float(normal_axis == 1), float(normal_axis == 2))
     return centre, normal, sense * (angle + 2 * math.pi * (turns - 1))
 
 
@@ -47,10 +47,10 @@ def _sense(word: str) -> float:
 
 def _centre(word: str, plane: tuple[int, int, int], values: dict[str, float], unit: float, a: Point, b: Point) -> Point:
     """The centre by I, J and K, which count from a, or by R; takes these words out of `values`."""
-    x, y, across = plane
+    x, y, normal_axis = plane
     offsets = {k: values.pop(letter) * unit for k, letter in enumerate("IJK") if letter in values}
-    if across in offsets:
-        raise ArcError(f"{word} has {'IJK'[across]} in the plane of {AXES[x]} and {AXES[y]}")
+    if normal_axis in offsets:
+        raise ArcError(f"{word} has {'IJK'[normal_axis]} in the plane of {AXES[x]} and {AXES[y]}")
     if "R" not in values:
         if not offsets:
             raise ArcError(f"{word} needs {'IJK'[x]}, {'IJK'[y]} or R")
@@ -75,12 +75,12 @@ def _equalised_centre(plane: tuple[int, int, int], centre: Point, a: Point, b: P
     if size == 0.0:
         return centre
     u, v = (a[x] - centre[x], a[y] - centre[y]), (b[x] - centre[x], b[y] - centre[y])
-    along = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size)
-    if abs(along) > 2 * miss:
+    overhang = ((u[0] + v[0]) * chord[0] + (u[1] + v[1]) * chord[1]) / (2 * size)
+    if abs(overhang) > 2 * miss:
         return centre
     centre_list = list(centre)
-    centre_list[x] += along * chord[0] / size
-    centre_list[y] += along * chord[1] / size
+    centre_list[x] += overhang * chord[0] / size
+    centre_list[y] += overhang * chord[1] / size
     return centre_list[0], centre_list[1], centre_list[2]
 
 

@@ -24,15 +24,15 @@ _SYNONYMS = {
 
 def problems(error: ValidationError) -> Iterator[tuple[Place, str]]:
     """Places and texts, each place once: of a key that takes several shapes, the shape that came nearest."""
-    best: dict[Place, Any] = {}
+    deepest: dict[Place, Any] = {}
     for problem in error.errors(include_url=False):
         place = _place_of(problem["loc"])
-        if place not in best or len(problem["loc"]) > len(best[place]["loc"]):
-            best[place] = problem
-    for place in list(best):  # what is wrong inside a value says more than that the value is wrong
-        if any(len(deeper) > len(place) and deeper[: len(place)] == place for deeper in best):
-            del best[place]
-    for place, problem in best.items():
+        if place not in deepest or len(problem["loc"]) > len(deepest[place]["loc"]):
+            deepest[place] = problem
+    for place in list(deepest):  # what is wrong inside a value says more than that the value is wrong
+        if any(len(inner) > len(place) and inner[: len(place)] == place for inner in deepest):
+            del deepest[place]
+    for place, problem in deepest.items():
         yield place, f"{_place_text(place)}{_problem_text(place, problem)}"
 
 

@@ -55,14 +55,14 @@ def parse_svg(raw: bytes, name: str, placing: Placing, options: DrawingOptions) 
     root = _parse_tree(raw, name)
     if root.tag != "svg":
         raise PathFileError(f"{name}:{root.line}: is <{root.tag}>, and no <svg>", file=name, line=root.line)
-    named = {element.attributes["id"]: element for element in _elements(root) if "id" in element.attributes}
+    element_of_id = {element.attributes["id"]: element for element in _elements(root) if "id" in element.attributes}
     pen = _Drawer(name, Pen(placing), options, options.lift / placing.scale)
     try:
         frame = _drawing_frame(root)
     except ShapeError as error:
         raise PathFileError(f"{name}:{root.line}: <svg>: {error}", file=name, line=root.line) from None
     for child in root.children:
-        pen.draw(child, frame, named, 0)
+        pen.draw(child, frame, element_of_id, 0)
     pen.lift()
     return pen.pen.file(name, (), raw, f"it needs an outline of {', '.join(sorted(SHAPES))}")
 
@@ -77,8 +77,8 @@ def _parse_tree(raw: bytes, name: str) -> _Element:
         raise
     except expat.ExpatError as error:
         line = reader.skipped + error.lineno
-        why = expat.ErrorString(error.code)
-        raise PathFileError(f"{name}:{line}: is not XML: {why}", file=name, line=line) from None
+        reason = expat.ErrorString(error.code)
+        raise PathFileError(f"{name}:{line}: is not XML: {reason}", file=name, line=line) from None
     except (LookupError, ValueError) as error:
         raise PathFileError(f"{name}:1: is not XML: {error}", file=name, line=1) from None
     return reader.top.children[0]
@@ -97,13 +97,13 @@ class _Reader:
         self.parser.EntityDeclHandler = self._entity
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
-        made = _Element(tag.rpartition(":")[2], attributes, self.skipped + self.parser.CurrentLineNumber)
+        element = _Element(tag.rpartition(":")[2], attributes, self.skipped + self.parser.CurrentLineNumber)
         if tag.partition(":")[0] in ("sodipodi", "inkscape"):
-            made.tag = "metadata"
-        self._open[-1].children.append(made)
-        self._open.append(made)
+            element.tag = "metadata"
+        self._open[-1].children.append(element)
+        self._open.append(element)
         if len(self._open) > 4 * _MAX_DEPTH:
-            place = f"{self.name}:{made.line}"
+            place = f"{self.name}:{element.line}"
             raise PathFileError(f"{place}: elements in each other deeper than {4 * _MAX_DEPTH}", file=self.name)
 
     def _end(self, tag: str) -> None:
@@ -137,10 +137,10 @@ def _drawing_frame(root: _Element) -> Matrix:
 
 def _scales(size: Sequence[float | None], box: Sequence[float], ratio: str) -> tuple[float, float]:
     """The drawing's length of a unit of the viewBox along x and y; ratio: what preserveAspectRatio says."""
-    across, down = (
+    x_scale, y_scale = (
         None if length is None else length / box_length for length, box_length in zip(size, box, strict=True)
     )
-    sx, sy = across or down or 1.0, down or across or 1.0
+    sx, sy = x_scale or y_scale or 1.0, y_scale or x_scale or 1.0
     if ratio.split()[:1] == ["none"]:
         return sx, sy
     scale = max(sx, sy) if "slice" in ratio else min(sx, sy)
@@ -160,7 +160,7 @@ class _Drawer:
     elements: int = 0
     line: int = 0
 
-    def draw(self, element: _Element, transform: Matrix, named: dict[str, _Element], depth: int) -> None:
+    def draw(self, element: _Element, transform: Matrix, element_of_id: dict[str, _Element], depth: int) -> None:
         """An element and all in it; m: from where it stands to millimetres."""
         if not self._is_drawn(element, depth):
             return
@@ -168,7 +168,7 @@ class _Drawer:
             transform = multiply(transform, parse_transform(element.attributes.get("transform", "")))
             if element.tag == "use":
                 shift = (parse_length(element.attributes.get("x")), parse_length(element.attributes.get("y")))
-                self._draw_used(element, multiply(transform, (1.0, 0.0, 0.0, 1.0, *shift)), named, depth)
+                self._draw_used(element, multiply(transform, (1.0, 0.0, 0.0, 1.0, *shift)), element_of_id, depth)
             elif element.tag in SHAPES:
                 for stroke in outlines(element.tag, element.attributes, transform):
                     self._draw_stroke(element, stroke)
@@ -176,7 +176,7 @@ class _Drawer:
             raise self._error(element, str(error)) from None
         if element.tag in _GROUPS and (element.tag != "symbol" or depth):
             for child in element.children:
-                self.draw(child, transform, named, depth + 1)
+                self.draw(child, transform, element_of_id, depth + 1)
 
     def _is_drawn(self, element: _Element, depth: int) -> bool:
         """Whether an element can be seen. Raises PathFileError for one that would be drawn wrongly."""
@@ -197,19 +197,19 @@ class _Drawer:
             raise self._error(element, "stands inside of another <svg>")
         return True
 
-    def _draw_used(self, element: _Element, transform: Matrix, named: dict[str, _Element], depth: int) -> None:
+    def _draw_used(self, element: _Element, transform: Matrix, element_of_id: dict[str, _Element], depth: int) -> None:
         """Draw the element that a <use> names; PathFileError if there is none."""
         href = element.attributes.get("href", element.attributes.get("xlink:href", ""))
-        if href[:1] != "#" or href[1:] not in named:
+        if href[:1] != "#" or href[1:] not in element_of_id:
             raise self._error(element, f"uses '{href[:40]}', which is not in this file")
-        used = named[href[1:]]
-        if used.tag != "symbol":
-            self.draw(used, transform, named, depth + 1)
+        target = element_of_id[href[1:]]
+        if target.tag != "symbol":
+            self.draw(target, transform, element_of_id, depth + 1)
             return
-        if "viewBox" in used.attributes:
+        if "viewBox" in target.attributes:
             raise self._error(element, "uses a symbol with a viewBox")
-        for child in used.children:
-            self.draw(child, transform, named, depth + 1)
+        for child in target.children:
+            self.draw(child, transform, element_of_id, depth + 1)
 
     def _draw_stroke(self, element: _Element, stroke: list[Point]) -> None:
         """Draw a stroke of points [mm], the pen lifted on the way to where it begins."""

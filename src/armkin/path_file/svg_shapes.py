@@ -230,10 +230,10 @@ class _Outline:
         return a * point[0] + c * point[1] + e, b * point[0] + d * point[1] + f
 
 
-def _chord_count(count: float, least: int) -> int:
+def _chord_count(count: float, min_count: int) -> int:
     if not count <= _MAX_CHORDS:
         raise ShapeError(f"a curve needs more than {_MAX_CHORDS} chords: is the drawing this large?")
-    return max(math.ceil(count), least)
+    return max(math.ceil(count), min_count)
 
 
 def _draw_path(pen: _Outline, data: str) -> None:

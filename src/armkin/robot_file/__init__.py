@@ -104,15 +104,15 @@ def _validate(keys: dict[str, Any]) -> RobotFile:
     if not RobotFile.__pydantic_complete__:
         # Looking for pydantic's plugins reads the metadata of every installed package, which takes
         # longer than all the rest of a robot file; nothing here is for them to observe.
-        before = os.environ.get("PYDANTIC_DISABLE_PLUGINS")
+        old_setting = os.environ.get("PYDANTIC_DISABLE_PLUGINS")
         os.environ["PYDANTIC_DISABLE_PLUGINS"] = "__all__"
         try:
             RobotFile.model_rebuild()
         finally:
-            if before is None:
+            if old_setting is None:
                 del os.environ["PYDANTIC_DISABLE_PLUGINS"]
             else:
-                os.environ["PYDANTIC_DISABLE_PLUGINS"] = before
+                os.environ["PYDANTIC_DISABLE_PLUGINS"] = old_setting
     return RobotFile.model_validate(keys)
 
 
@@ -136,8 +136,8 @@ def _place_text(path: strict_yaml.Path, keys: dict[str, Any]) -> str:
         item = keys[path[0]][path[1]]
         name = item.get("name") if isinstance(item, dict) else None
         kind = str(path[0])[:-1]
-        named = isinstance(name, str) and 0 < len(name) <= 40 and name.isprintable()
-        words.append(f"{kind} {name}" if named else f"{kind} number {path[1] + 1}")
+        has_name = isinstance(name, str) and 0 < len(name) <= 40 and name.isprintable()
+        words.append(f"{kind} {name}" if has_name else f"{kind} number {path[1] + 1}")
         path = path[2:]
     while path and isinstance(path[-1], int):  # the line is the item's; its number says nothing
         path = path[:-1]

@@ -72,15 +72,15 @@ def _similar_names(robot: str) -> list[str]:
     if not stem or len(stem) > 100:
         return []
     try:
-        beside = [entry for entry in sorted(os.listdir(folder or ".")) if entry.endswith(_SUFFIXES)]
+        files_there = [entry for entry in sorted(os.listdir(folder or ".")) if entry.endswith(_SUFFIXES)]
     except OSError:
-        beside = []
-    for choices, parent, cutoff in ((beside, folder, 0.75), (list(robot_names()), "", 0.76)):  # arm is no xarm6
+        files_there = []
+    for choices, parent, cutoff in ((files_there, folder, 0.75), (list(robot_names()), "", 0.76)):  # arm is no xarm6
         # Case, dashes and the suffix are what people get wrong most: compare without them.
-        plain = {_comparable_name(choice): choice for choice in choices}
-        close = get_close_matches(_comparable_name(base), plain, n=1, cutoff=cutoff)
-        if close:
-            return [os.path.join(parent, plain[close[0]])]
+        choice_of = {_comparable_name(choice): choice for choice in choices}
+        matches = get_close_matches(_comparable_name(base), choice_of, n=1, cutoff=cutoff)
+        if matches:
+            return [os.path.join(parent, choice_of[matches[0]])]
     begun = [name for name in robot_names() if len(stem) > 1 and name.startswith(_comparable_name(base))]
     return begun[:4]
 

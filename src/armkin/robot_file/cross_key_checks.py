@@ -66,11 +66,11 @@ def _check_poses(robot: RobotKeys) -> Iterator[Problem]:
 
 
 def _check_repeated(kind: str, names: list[str], key: str) -> Iterator[Problem]:
-    seen: set[str] = set()
+    earlier_names: set[str] = set()
     for i, name in enumerate(names):
-        if name in seen:
+        if name in earlier_names:
             yield (key, i, "name"), f"a {kind} named {name} is there already; {kind} names are unique"
-        seen.add(name)
+        earlier_names.add(name)
 
 
 def _check_joint(joint: Joint, convention: str) -> Iterator[Problem]:
@@ -147,8 +147,8 @@ def _check_unit(key: str, vector: Triple) -> Iterator[Problem]:
     if length == 0:
         yield ("screw", key), "is zero; give the direction of motion, of length 1"
     elif abs(length - 1) > _ROUNDING:
-        better = ", ".join(f"{x / length:.6g}" for x in vector)
-        yield ("screw", key), f"has length {length:g}, must be 1; write [{better}]"
+        unit_vector = ", ".join(f"{x / length:.6g}" for x in vector)
+        yield ("screw", key), f"has length {length:g}, must be 1; write [{unit_vector}]"
 
 
 def _check_homing(joint: Joint) -> Iterator[Problem]:
@@ -203,10 +203,10 @@ def _check_weights(motor: Motor, robot: RobotKeys) -> Iterator[Problem]:
             yield ("joints", name), f"there is no joint {name}; the joints are {', '.join(types)}"
         if abs(weight) < _MIN_WEIGHT:
             yield ("joints", name), f"weight {weight:g} does nothing; leave {name} out"
-    turned = {types[name] for name in motor.joints if name in types}
-    if motor.lead is not None and "revolute" in turned:
+    joint_types = {types[name] for name in motor.joints if name in types}
+    if motor.lead is not None and "revolute" in joint_types:
         yield ("lead",), "is for motors of prismatic joints only; give weights in degrees per mm instead"
-    if motor.kind == "stepper" and motor.lead is None and turned == {"prismatic"}:
+    if motor.kind == "stepper" and motor.lead is None and joint_types == {"prismatic"}:
         yield (), "a prismatic joint's stepper needs lead, the mm per turn"
 
 
@@ -262,16 +262,16 @@ def _check_axes(robot: RobotKeys) -> Iterator[Problem]:
     """Each axis is used once, and the board has it."""
     board = robot.board
     foreign = None if board is None else board_catalogue.foreign_board(board.kind)
-    used: set[tuple[str, object]] = set()
+    used_keys: set[tuple[str, object]] = set()
     for path, drive in _drives(robot, foreign):
         if board is not None and drive.kind == "bus" and board.kind in BOARDS:
             yield (*path, "kind"), f"{board.kind} has no bus; leave board out, or name one that has"
         if foreign is not None and drive.kind != foreign.motors:
             yield (*path, "kind"), f"{foreign.kind} takes drives of kind {foreign.motors} alone, not {drive.kind}"
         for key in _USED_ONCE:
-            if (key, getattr(drive, key)) in used:
+            if (key, getattr(drive, key)) in used_keys:
                 yield (*path, key), f"{getattr(drive, key)} is used already; {_USED_ONCE[key]}"
-        used |= {(key, getattr(drive, key)) for key in _USED_ONCE if getattr(drive, key) is not None}
+        used_keys |= {(key, getattr(drive, key)) for key in _USED_ONCE if getattr(drive, key) is not None}
         if drive.axis is not None:
             yield from _check_board_axis(board, foreign, drive, path)
     if board is not None:

@@ -31,8 +31,8 @@ def check_drive(drive: Drive) -> Iterator[Problem]:
     motor = "bus servo" if drive.kind == "bus" else drive.kind
     for key in (key for key in dict.fromkeys(sum(_KEYS.values(), ())) if key in keys_given and key not in allowed):
         message = f"a {motor} has no {key}; it takes {', '.join(allowed) or 'open and closed alone'}"
-        kind, named = ("bus", "bus servo") if key in ("id", "counts") else ("servo", "servo")
-        yield (key,), message + (f"; for a {named} write kind: {kind}" if drive.kind == "stepper" else "")
+        kind, kind_name = ("bus", "bus servo") if key in ("id", "counts") else ("servo", "servo")
+        yield (key,), message + (f"; for a {kind_name} write kind: {kind}" if drive.kind == "stepper" else "")
     yield from _OF_DRIVES[drive.kind](drive)
 
 
@@ -44,24 +44,24 @@ def _check_spindle(drive: Drive) -> Iterator[Problem]:
 
 
 def _check_bus_servo(drive: Drive) -> Iterator[Problem]:
-    if missing := _missing_keys(drive, "id", "counts"):
-        yield (), f"a bus servo needs {missing}, for example id: 1, counts: 4096, zero: 2048"
+    if missing_keys := _missing_keys(drive, "id", "counts"):
+        yield (), f"a bus servo needs {missing_keys}, for example id: 1, counts: 4096, zero: 2048"
     if drive.axis is not None:
         yield ("axis",), "a bus servo has no axis; its place on the bus is id"
 
 
 def _check_stepper(drive: Drive) -> Iterator[Problem]:
-    missing = _missing_keys(drive, "full_steps", "microsteps")
-    if missing and not any(key in drive.model_fields_set for key in _SERVO_KEYS):
+    missing_keys = _missing_keys(drive, "full_steps", "microsteps")
+    if missing_keys and not any(key in drive.model_fields_set for key in _SERVO_KEYS):
         example = "for example full_steps: 200, microsteps: 16 (an RC servo: kind: servo)"
-        yield (), f"a stepper needs {missing}, {example}"
-    elif not missing and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
+        yield (), f"a stepper needs {missing_keys}, {example}"
+    elif not missing_keys and not 1e-3 <= drive.pulses_per_turn() <= 1e9:
         yield (), f"{drive.pulses_per_turn():g} pulses per turn; 0.001 to 1e9 can be right"
 
 
 def _check_servo(drive: Drive) -> Iterator[Problem]:
-    if missing := _missing_keys(drive, "travel", "pulse_us"):
-        yield (), f"a servo needs {missing}, for example travel: [0, 180], pulse_us: [500, 2500]"
+    if missing_keys := _missing_keys(drive, "travel", "pulse_us"):
+        yield (), f"a servo needs {missing_keys}, for example travel: [0, 180], pulse_us: [500, 2500]"
     for key in ("travel", "pulse_us"):
         pair = getattr(drive, key)
         if pair is not None and pair[0] >= pair[1]:

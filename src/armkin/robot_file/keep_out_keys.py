@@ -67,8 +67,10 @@ def _to_entry(value: Any) -> Any:
         return _ITSELF
     if isinstance(value, dict | Entry):
         return value
-    shown = f"'{value}'" if isinstance(value, str) else "this"
-    raise PydanticCustomError("problem", "{said} is no keep-out; write {example}", {"said": shown, "example": EXAMPLE})
+    value_text = f"'{value}'" if isinstance(value, str) else "this"
+    raise PydanticCustomError(
+        "problem", "{said} is no keep-out; write {example}", {"said": value_text, "example": EXAMPLE}
+    )
 
 
 EXAMPLE = "- self, - floor: 0, - box: {min: [200, -300, 0], max: [500, 300, 120]} or - capsule: {...}"
@@ -77,18 +79,20 @@ ENTRIES: TypeAdapter[tuple[Entry, ...]] = TypeAdapter(tuple[Annotated[Entry, Bef
 
 def read_keep_outs(values: Any) -> tuple[Entry, ...]:
     """The entries of a file. Raises PydanticCustomError with pydantic's `errors`, or with `problems`: path and text."""
-    wrong: list[tuple[Path, str]] = []
+    problems: list[tuple[Path, str]] = []
     if not isinstance(values, tuple | list):
-        wrong = [(("keep_out",), f"must be a list; write {EXAMPLE}")]
+        problems = [(("keep_out",), f"must be a list; write {EXAMPLE}")]
     elif len(values) > MAX_ENTRIES:
-        wrong = [(("keep_out",), f"{len(values)} entries; a file has at most {MAX_ENTRIES}: put a box around several")]
+        problems = [
+            (("keep_out",), f"{len(values)} entries; a file has at most {MAX_ENTRIES}: put a box around several")
+        ]
     else:
         try:
             return ENTRIES.validate_python(tuple(values))
         except ValidationError as error:
             errors = [{**problem, "loc": ("keep_out", *problem["loc"])} for problem in error.errors(include_url=False)]
             raise PydanticCustomError("errors", "keep_out", {"errors": errors}) from None
-    raise PydanticCustomError("problems", "{text}", {"text": wrong[0][1], "problems": wrong})
+    raise PydanticCustomError("problems", "{text}", {"text": problems[0][1], "problems": problems})
 
 
 def keep_out_names(entries: Iterable[Entry], used: Iterable[str] = ()) -> list[str]:
@@ -114,7 +118,7 @@ def keep_out_problems(
     body_names, earlier_entries = set(bodies), list(earlier)
     entries = list(entries)
     called = keep_out_names([*earlier_entries, *entries])
-    seen = set(called[: len(earlier_entries)]) - {SELF}
+    known_names = set(called[: len(earlier_entries)]) - {SELF}
     for i, (entry, name) in enumerate(zip(entries, called[len(earlier_entries) :], strict=True)):
         for path, text in _check_shape(entry):
             yield ("keep_out", i, *path), text
@@ -124,9 +128,9 @@ def keep_out_problems(
             yield ("keep_out", i, "name"), "must be a word or two of printable text, and not self"
         if name in body_names:
             yield ("keep_out", i, "name"), f"{name} is the name of one of the arm's bodies; choose another one"
-        if name in seen:
+        if name in known_names:
             yield ("keep_out", i), f"a keep-out named {name} is there already; give this one a name of its own"
-        seen.add(name)
+        known_names.add(name)
 
 
 def _check_shape(entry: Entry) -> Iterator[tuple[Path, str]]:
@@ -140,12 +144,12 @@ def _check_shape(entry: Entry) -> Iterator[tuple[Path, str]]:
 
 
 def _check_box(box: Box) -> Iterator[tuple[Path, str]]:
-    corners, placed = box.min is not None or box.max is not None, box.size is not None
-    if corners and (placed or box.model_fields_set & {"xyz", "rpy"}):
+    has_corners, has_size = box.min is not None or box.max is not None, box.size is not None
+    if has_corners and (has_size or box.model_fields_set & {"xyz", "rpy"}):
         yield (), "has min or max and size, xyz or rpy; write {min, max}, or {size, xyz, rpy}"
-    elif not corners and not placed:
+    elif not has_corners and not has_size:
         yield (), "needs min and max, [200, -300, 0] and [500, 300, 120], or size, xyz and rpy"
-    elif corners and (box.min is None or box.max is None):
+    elif has_corners and (box.min is None or box.max is None):
         yield (), f"has no {'min' if box.min is None else 'max'}; a box has both corners"
     elif box.min is not None and box.max is not None:
         yield from (((), text) for text in _check_thickness(box.min, box.max))

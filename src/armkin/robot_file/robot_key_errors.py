@@ -189,21 +189,21 @@ def _not_a_number(kind: str, path: Path, value: Any) -> str:
 
 def _instead_text(key: str | int, value: str) -> str:
     """What to write instead of text that is meant as a number; empty where that cannot be known."""
-    bare = value.strip().lower()
-    if key in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", bare):
+    stripped = value.strip().lower()
+    if key in ("theta", "d") and re.fullmatch(r"[+-]?(?:q|theta|th|d)_?[0-9]{0,2}\*?(?: *[+-].*)?", stripped):
         return (
             f"; leave the variable out: {key} is the constant part, and the joint's value is added "
             "to theta (of a prismatic joint: to d)"
         )
     for unit in ("mm", "deg", "degrees", "°", "us"):
-        bare = bare.removesuffix(unit).strip()
-    if bare != value.strip().lower():
-        return f"; units are fixed (mm, degrees), write {bare}" if _is_number(bare) else ""
-    if _is_number(bare):
-        return f"; write {bare} without quotes"
-    if _is_number(bare.replace(",", ".")):
-        return f"; write {bare.replace(',', '.')} with a point"
-    return "; angles are in degrees, so pi/2 is 90" if "pi" in bare else ""
+        stripped = stripped.removesuffix(unit).strip()
+    if stripped != value.strip().lower():
+        return f"; units are fixed (mm, degrees), write {stripped}" if _is_number(stripped) else ""
+    if _is_number(stripped):
+        return f"; write {stripped} without quotes"
+    if _is_number(stripped.replace(",", ".")):
+        return f"; write {stripped.replace(',', '.')} with a point"
+    return "; angles are in degrees, so pi/2 is 90" if "pi" in stripped else ""
 
 
 def _is_number(text: str) -> bool:
@@ -213,10 +213,10 @@ def _is_number(text: str) -> bool:
         return False
 
 
-def _not_a_choice(value: str, expected: str, shown: str) -> str:
+def _not_a_choice(value: str, expected: str, value_text: str) -> str:
     choices = expected.replace(" or ", ", ").split(", ")
     near = _nearest_key(value, choices)
-    return f"must be {expected}, not {shown}" + (f"; did you mean {near}?" if near else "")
+    return f"must be {expected}, not {value_text}" + (f"; did you mean {near}?" if near else "")
 
 
 def _unknown_key(path: Path) -> str:

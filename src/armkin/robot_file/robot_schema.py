@@ -60,18 +60,18 @@ class _Generator(GenerateJsonSchema):
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
         """A default of null is none."""
-        made = super().default_schema(schema)
-        if made.get("default") is None:
-            made.pop("default", None)
-        return made
+        schema_part = super().default_schema(schema)
+        if schema_part.get("default") is None:
+            schema_part.pop("default", None)
+        return schema_part
 
     def tuple_schema(self, schema: core_schema.TupleSchema) -> JsonSchemaValue:
         """One kind of item instead of a list of kinds."""
-        made = super().tuple_schema(schema)
-        items = made.pop("prefixItems", None)
+        schema_part = super().tuple_schema(schema)
+        items = schema_part.pop("prefixItems", None)
         if items:
-            made["items"] = items[0]  # all our tuples are of one kind
-        return made
+            schema_part["items"] = items[0]  # all our tuples are of one kind
+        return schema_part
 
 
 def json_schema() -> dict[str, Any]:
@@ -94,18 +94,18 @@ def scene_schema() -> dict[str, Any]:
 
 def add_keep_out_schema(schema: dict[str, Any]) -> dict[str, Any]:
     """A schema whose `keep_out` says what an entry is: the word self, or one of the shapes."""
-    made = _tidy_schema(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
-    schema.setdefault("$defs", {}).update(made.pop("$defs", {}))
-    schema["$defs"]["Entry"] = made
+    entry_schema = _tidy_schema(TypeAdapter(keep_out_keys.Entry).json_schema(schema_generator=_Generator))
+    schema.setdefault("$defs", {}).update(entry_schema.pop("$defs", {}))
+    schema["$defs"]["Entry"] = entry_schema
     items = {"anyOf": [{"const": keep_out_keys.SELF}, {"$ref": "#/$defs/Entry"}]}
     schema["properties"]["keep_out"] |= {"items": items, "maxItems": keep_out_keys.MAX_ENTRIES}
     return schema
 
 
-def schema_of_model(model: type[BaseModel], title: str, **more: Any) -> dict[str, Any]:
+def schema_of_model(model: type[BaseModel], title: str, **keys: Any) -> dict[str, Any]:
     """The schema of a kind of file; more: keys that stand before those of the model."""
-    made = _tidy_schema(model.model_json_schema(schema_generator=_Generator))
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **more, **made}
+    model_schema = _tidy_schema(model.model_json_schema(schema_generator=_Generator))
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **keys, **model_schema}
 
 
 def _tidy_schema(part: Any) -> Any:

@@ -66,8 +66,8 @@ def parse_scene(raw: bytes | str, name: str = "scene.yaml") -> Scene:
             problems.append((path, text))
         _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in problems])
     scene._path, scene._sha256 = name, hashlib.sha256(encoded).hexdigest()
-    if wrong := list(entries.keep_out_problems(scene.keep_out)):
-        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in wrong])
+    if scene_problems := list(entries.keep_out_problems(scene.keep_out)):
+        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in scene_problems])
     return scene
 
 

@@ -321,9 +321,9 @@ def _resolve(text: str, line: int) -> str | int | float | bool:
     if word in ("true", "false"):
         return word == "true"
     if word in _WORDS_FOR_TRUE or word in _WORDS_FOR_FALSE:
-        meant = "true" if word in _WORDS_FOR_TRUE else "false"
-        problem = f"{text} is {meant} to some YAML readers and text to others"
-        raise StrictYamlError(line, f'{problem}; write {meant}, or "{text}" for text')
+        boolean = "true" if word in _WORDS_FOR_TRUE else "false"
+        problem = f"{text} is {boolean} to some YAML readers and text to others"
+        raise StrictYamlError(line, f'{problem}; write {boolean}, or "{text}" for text')
     return text
 
 
@@ -350,21 +350,21 @@ def _refuse_what_misleads(text: str, line: int) -> None:
         raise StrictYamlError(line, _sexagesimal_text(text))
     if zeros := re.fullmatch(_LEADING_ZERO, text):
         digits = zeros[2].replace("_", "").lstrip("0")
-        plain = zeros[1] + (digits if digits[:1].isdigit() else f"0{digits}")
+        number_text = zeros[1] + (digits if digits[:1].isdigit() else f"0{digits}")
         problem = f"{one_line(text)} begins with 0, which YAML may read as octal"
-        raise StrictYamlError(line, f"{problem}; write {one_line(plain)}, or quotes for text")
+        raise StrictYamlError(line, f"{problem}; write {one_line(number_text)}, or quotes for text")
     if re.fullmatch(_OTHER_BASE, text):
         raise StrictYamlError(line, f"{one_line(text)} is not decimal; write it in decimal, or in quotes")
     if "_" in text and re.fullmatch(_UNDERSCORE, text):
-        plain = text.replace("_", "")
-        raise StrictYamlError(line, f"{one_line(text)} has underscores; write {one_line(plain)}")
+        number_text = text.replace("_", "")
+        raise StrictYamlError(line, f"{one_line(text)} has underscores; write {one_line(number_text)}")
     if (near := re.fullmatch(_LIKE_FLOAT, text)) and (near[2] or near[3]):
         sign, integer, part, exponent_sign, exponent = near.groups()
-        better = f"{sign.replace('+', '')}{integer or '0'}.{part or '0'}"
+        decimal_text = f"{sign.replace('+', '')}{integer or '0'}.{part or '0'}"
         if exponent:
-            better += f"e{exponent_sign or '+'}{exponent}"
+            decimal_text += f"e{exponent_sign or '+'}{exponent}"
         problem = f"{one_line(text)} is text to YAML, not a number"
-        raise StrictYamlError(line, f"{problem}; write {one_line(better)}, or quotes for text")
+        raise StrictYamlError(line, f"{problem}; write {one_line(decimal_text)}, or quotes for text")
     if re.fullmatch(_TIMESTAMP, text):
         raise StrictYamlError(line, f'{one_line(text)} is a date to YAML; write "{text}" for text')
 
@@ -372,9 +372,9 @@ def _refuse_what_misleads(text: str, line: int) -> None:
 def _sexagesimal_text(text: str) -> str:
     parts = text.lstrip("+-").split(":")
     if len(parts) == 2 and all(part.isdigit() and len(part) < 6 for part in parts):
-        large, small = int(parts[0]), int(parts[1])
-        value = str(60 * large + small) if small < 60 else "text"
-        motor, joint = sorted((large, small))  # a reduction, most likely
+        first, second = int(parts[0]), int(parts[1])
+        value = str(60 * first + second) if second < 60 else "text"
+        motor, joint = sorted((first, second))  # a reduction, most likely
         return f"{text} is {value} to YAML; write teeth as {{motor: {motor}, joint: {joint}}}"
     return f"{one_line(text)} is a base-60 number to YAML; write a plain number, or quotes for text"
 

@@ -167,15 +167,15 @@ class Tree:
 
     def _check_way_down(self, link: str) -> None:
         """From a link to its parent, and on to one that has none."""
-        seen = {link}
+        links_above = {link}
         while link in self.parent:
             link = str(self.parent[link].text("parent", "link"))
-            if link in seen:
+            if link in links_above:
                 raise RobotFileError(
                     f"{self.name}: link {link} hangs on itself by way of others: the joints are a circle"
                 )
-            seen.add(link)
-            if len(seen) > 200:
+            links_above.add(link)
+            if len(links_above) > 200:
                 raise RobotFileError(f"{self.name}: a chain of more than 200 links")
 
     def base(self, base: str | None) -> str:
@@ -200,16 +200,16 @@ class Tree:
                 raise UsageError(f"{self.name}: tip {tip} does not hang on base {base}")
             return tip
         leaves = [(self.count_moving(base, link), link) for link in self.leaves(base)]
-        moving = [link for count, link in leaves if count]
-        if not moving:
+        moving_leaves = [link for count, link in leaves if count]
+        if not moving_leaves:
             raise RobotFileError(f"{self.name}: no joint moves between {base} and its ends; there is no arm")
-        if len(moving) > 1:
-            several = list(dict.fromkeys([*self._shared_body(base, moving), *moving]))
+        if len(moving_leaves) > 1:
+            candidates = list(dict.fromkeys([*self._shared_body(base, moving_leaves), *moving_leaves]))
             raise UsageError(
                 f"{self.name}: the arm has several ends, and which is its tip is not said; "
-                f"the tip must be named: {in_words(several)}"
+                f"the tip must be named: {in_words(candidates)}"
             )
-        return moving[0]
+        return moving_leaves[0]
 
     def leaves(self, base: str) -> list[str]:
         """Links below base that carry none."""
@@ -228,8 +228,8 @@ class Tree:
 
     def _shared_body(self, base: str, links: list[str]) -> list[str]:
         """The links of the last moving body that all these links hang on; [] if that is the base."""
-        ways = [self.chain(base, link) for link in links]
-        common = [joint for joint in ways[0] if all(joint in way for way in ways) and joint.kind != "fixed"]
+        chains = [self.chain(base, link) for link in links]
+        common = [joint for joint in chains[0] if all(joint in chain for chain in chains) and joint.kind != "fixed"]
         body = [str(joint.text("child", "link")) for joint in common[-1:]]
         for link in body:
             body += [str(joint.text("child", "link")) for joint in self.children[link] if joint.kind == "fixed"]

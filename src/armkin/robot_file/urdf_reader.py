@@ -89,13 +89,13 @@ def parse_urdf(
 
 def _note_bodies(keys: dict[str, Any], tree: Tree, base: str, joints: list[Joint]) -> None:
     """Note the radius of every body whose collision shapes are all round: boxes and meshes tell none."""
-    moving = keys.pop("joints")
+    entries = keys.pop("joints")
     if radius := _greatest_radius(tree.collision_shapes(base)):
         keys["base"] = {"body": {"radius": radius}}
-    for joint, entry in zip(joints, moving, strict=True):
+    for joint, entry in zip(joints, entries, strict=True):
         if radius := _greatest_radius(tree.collision_shapes(str(joint.text("child", "link")))):
             entry["body"] = {"radius": radius}
-    keys["joints"] = moving
+    keys["joints"] = entries
 
 
 def _greatest_radius(solids: list[tuple[str, dict[str, str]]]) -> float | None:
@@ -214,17 +214,17 @@ def _limit_keys(name: str, low: float, high: float, unit: str, place: str, notes
 
 def _unique_names(joints: list[str], notes: list[str]) -> dict[str, str]:
     """Joint names as a robot file takes them: no spaces, slashes or colons, 32 characters, all different."""
-    taken: dict[str, str] = {}
+    name_of: dict[str, str] = {}
     for name in joints:
-        plain = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:32]
-        plain = plain if re.match(r"[A-Za-z_]", plain) else f"_{plain}"[:32]
+        new_name = re.sub(r"[^A-Za-z0-9_.-]", "_", name)[:32]
+        new_name = new_name if re.match(r"[A-Za-z_]", new_name) else f"_{new_name}"[:32]
         number = 2
-        while plain in taken.values():
-            plain, number = f"{plain[:29]}_{number}", number + 1
-        if plain != name:
-            notes.append(f"joint {name[:60]} is named {plain}")
-        taken[name] = plain
-    return taken
+        while new_name in name_of.values():
+            new_name, number = f"{new_name[:29]}_{number}", number + 1
+        if new_name != name:
+            notes.append(f"joint {name[:60]} is named {new_name}")
+        name_of[name] = new_name
+    return name_of
 
 
 def joint_origin(joint: Joint, place: str, snap: bool = False) -> Matrix:
@@ -258,15 +258,15 @@ def _cos_sin(angle: float, snap: bool) -> tuple[float, float]:
 
 def joint_axis(joint: Joint, place: str, snap: bool = False) -> Matrix:
     """The joint's direction in its own frame, of length 1; by default x, as the format says."""
-    way = np.array(parse_triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{place}: axis xyz"))
-    length = float(np.linalg.norm(way))
+    axis = np.array(parse_triple(joint.text("axis", "xyz"), (1.0, 0.0, 0.0), f"{place}: axis xyz"))
+    length = float(np.linalg.norm(axis))
     if not 1e-12 < length < 1e12:
-        raise RobotFileError(f"{place}: axis {' '.join(f'{x:g}' for x in way)} has no direction")
-    way = way / length
-    largest = int(np.argmax(np.abs(way)))
-    if snap and np.abs(np.delete(way, largest)).max() <= SNAP:
-        way = np.eye(3)[largest] * np.sign(way[largest])
-    return np.asarray(way)
+        raise RobotFileError(f"{place}: axis {' '.join(f'{x:g}' for x in axis)} has no direction")
+    axis = axis / length
+    largest = int(np.argmax(np.abs(axis)))
+    if snap and np.abs(np.delete(axis, largest)).max() <= SNAP:
+        axis = np.eye(3)[largest] * np.sign(axis[largest])
+    return np.asarray(axis)
 
 
 def _limit_value(joint: Joint, key: str, place: str) -> float | None:

@@ -71,10 +71,10 @@ class ServoArm(Backend):
         self.arm, self.port, self._stop = arm, port, stop
         self.ids = servo_ids(arm)
         self.bus = self._bus(port)
-        missing = [str(number) for number in self.ids if not self.bus.ping(number)]
-        if missing:
+        silent_servos = [str(number) for number in self.ids if not self.bus.ping(number)]
+        if silent_servos:
             raise LinkError(
-                f"no answer from servo{'s' * (len(missing) > 1)} {', '.join(missing)} on {port.name}: "
+                f"no answer from servo{'s' * (len(silent_servos) > 1)} {', '.join(silent_servos)} on {port.name}: "
                 "is the bus powered, is every cable plugged in, has every servo its own id?"
             )
         self._counts = np.zeros(len(self.ids), dtype=np.int64)

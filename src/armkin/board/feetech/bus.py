@@ -74,10 +74,11 @@ class Bus:
 
     def _require_answers(self, question: bytes, servos: Sequence[int], size: int) -> dict[int, bytes]:
         answers = self._ask(question, servos, size, tries=_MAX_TRIES)
-        missing = [servo for servo in servos if servo not in answers]
-        if missing:
+        silent_servos = [servo for servo in servos if servo not in answers]
+        if silent_servos:
             raise LinkError(
-                f"servo {missing[0]} on {self.port.name} does not answer: is its cable plugged in, is the bus powered?"
+                f"servo {silent_servos[0]} on {self.port.name} does not answer: is its cable plugged in, "
+                "is the bus powered?"
             )
         return answers
 

@@ -33,16 +33,16 @@ class _UnderWay:
     def __init__(self) -> None:
         self._moves: deque[tuple[int, float, Cut, int]] = deque()  # for each: frames before it, seconds, plan, number
 
-    def add(self, frames: int, seconds: float, plan: Cut, number: int, taken: int) -> None:
+    def add(self, frames: int, seconds: float, plan: Cut, number: int, taken_frames: int) -> None:
         """Add a move of a plan; frames, seconds: those before it.
 
         taken: number of frames that the board has taken; moves before the last such frame are finished.
         """
         self._moves.append((frames, seconds, plan, number))
-        self._forget_finished(taken)
+        self._forget_finished(taken_frames)
 
-    def _forget_finished(self, taken: int) -> None:
-        while len(self._moves) > 1 and self._moves[1][0] < taken:
+    def _forget_finished(self, taken_frames: int) -> None:
+        while len(self._moves) > 1 and self._moves[1][0] < taken_frames:
             self._moves.popleft()
 
     def remaining_plan(

@@ -43,8 +43,8 @@ class Configuration:
     @property
     def steppers(self) -> bool:
         """Whether a motor of the arm (or the gripper) is a stepper."""
-        used = [i for i, axis in enumerate(self.image.axes) if axis.used]
-        return any(i < len(self.board.steppers) for i in used)
+        used_axes = [i for i, axis in enumerate(self.image.axes) if axis.used]
+        return any(i < len(self.board.steppers) for i in used_axes)
 
 
 def configure(arm: Arm, *, rehearsal: bool = False) -> Configuration:

@@ -112,24 +112,24 @@ class FirmwareMachine(Backend):
         assume: (n,) [rad | mm] joint values of an arm whose position is lost, as the operator states them. Returns True
         if it was lost. Raises LinkError if it is lost and not assumed, or known and assumed.
         """
-        lost = self.position() == "lost"
-        if assume is not None and not lost:
+        is_lost = self.position() == "lost"
+        if assume is not None and not is_lost:
             raise PositionKnownError(
                 f"the position is known ({self.describe()}), and only a lost one may be assumed\n"
                 "motion starts where the arm stands",
                 advice="leave assume out",
                 joints=joints_out(self.arm, self.joints()).tolist(),
             )
-        if lost and assume is None and not self._simulated:
+        if is_lost and assume is None and not self._simulated:
             raise resets_and_stops.must_be_told(self)
         if not self.configured:
             self.configure()
-        if lost:
+        if is_lost:
             counts = pulses(self.arm, self.arm.home if assume is None else assume).tolist()
             self.vouch(dict(zip(self.configuration.axes, counts, strict=True)))
         self.enable(self.configuration.axes)
         probe_line(self.session)
-        return lost
+        return is_lost
 
     def configure(self) -> None:
         """Write the configuration; the board loses all positions."""
@@ -156,19 +156,19 @@ class FirmwareMachine(Backend):
 
     def vouch(self, counts: dict[int, int]) -> None:
         """Set the positions of lost axes as the operator states them: {axis: counts}."""
-        lost = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
+        lost_counts = {axis: count for axis, count in counts.items() if not self.status.known >> axis & 1}
         names = dict(zip(self.configuration.axes, motor_names(self.arm), strict=True))
         if contradictions := [
             f"{names.get(axis, 'the gripper')} at {self.status.counts[axis]} counts, not {count}"
             for axis, count in counts.items()
-            if axis not in lost and self.status.counts[axis] != count
+            if axis not in lost_counts and self.status.counts[axis] != count
         ]:
             raise LinkError(
                 f"the board knows other positions than those stated: {'; '.join(contradictions)}: home the arm, or "
                 "switch the board off and on to forget all"
             )
-        if lost:
-            self._call_board(lambda tag: protocol.set_position(tag, lost))
+        if lost_counts:
+            self._call_board(lambda tag: protocol.set_position(tag, lost_counts))
             self._renew_info()
 
     def _renew_info(self) -> None:
@@ -220,8 +220,8 @@ class FirmwareMachine(Backend):
 
     def check_late_ticks(self) -> None:
         """Raise LinkError if the board reports late ticks."""
-        if late := self.status.overruns:
-            raise LinkError(f"the board reports {late} late ticks: lower the speed\n{self.standing_text()}")
+        if late_ticks := self.status.overruns:
+            raise LinkError(f"the board reports {late_ticks} late ticks: lower the speed\n{self.standing_text()}")
 
     def run_axis(self, plan_move: Callable[[int], Move | None], axis: int, clock: int) -> Status:
         """Carry out the gripper's move, which `plan_move` makes from its counts; None: it has arrived."""

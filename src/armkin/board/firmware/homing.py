@@ -168,8 +168,8 @@ def _run_search(machine: FirmwareMachine, search: Search) -> tuple[Status, Statu
 def lost_joints(machine: FirmwareMachine) -> list[str]:
     """Names of the joints that are driven by a motor of unknown position."""
     arm, known_axes = machine.arm, machine.status.known if machine.configured else 0
-    lost = [not known_axes >> axis & 1 for axis in machine.configuration.axes]
-    is_lost = np.abs(arm.motor_gain[lost]).sum(axis=0) > 0
+    lost_motors = [not known_axes >> axis & 1 for axis in machine.configuration.axes]
+    is_lost = np.abs(arm.motor_gain[lost_motors]).sum(axis=0) > 0
     return [name for name, unknown in zip(arm.joint_names, is_lost, strict=True) if unknown]
 
 

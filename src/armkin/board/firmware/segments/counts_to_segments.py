@@ -152,15 +152,16 @@ class Cutter:
 
     def _ramp_segment(self, cycles: float, remainders: Sequence[int], steps: float, change: float) -> Segment:
         """A segment whose speed changes linearly, see `piece`, with the most ticks that board and `bend` allow."""
-        fast = (1 + abs(change) / 2) * self.min_interval
+        fastest_tick = (1 + abs(change) / 2) * self.min_interval
         # [cycles] of a tick, for the quick bend to have 16 bits
         shortest = cycles / (16 * change**2 * cycles) ** (1 / 3)
-        ticks = int(cycles / max(_QUICK_TICK_INTERVALS * fast, min(_TICK_S * self.clock, shortest)))
+        ticks = int(cycles / max(_QUICK_TICK_INTERVALS * fastest_tick, min(_TICK_S * self.clock, shortest)))
         bend = abs(_fit_parabola(cycles, ticks, change, True)[2]) if ticks > 1 and steps <= ticks <= _BEND_TICKS else 0
         quick = bend >= _MIN_BEND
         if not quick:
-            fine, ticks = (ticks, int(cycles / max(_TICK_INTERVALS * fast, _TICK_S * self.clock, cycles / _MAX_TICKS)))
-            is_few = ticks > 1 and steps <= _BEND_TICKS < fine
+            fine_ticks = ticks
+            ticks = int(cycles / max(_TICK_INTERVALS * fastest_tick, _TICK_S * self.clock, cycles / _MAX_TICKS))
+            is_few = ticks > 1 and steps <= _BEND_TICKS < fine_ticks
             if is_few and abs(_fit_parabola(cycles, ticks, change, False)[2]) == _MAX_BEND:
                 quick, ticks = True, _BEND_TICKS  # else the segment would end before the board has loaded the next one
         ticks = max(1, ticks, math.ceil(steps), math.ceil(cycles / _MAX_INTERVAL))

@@ -33,8 +33,8 @@ class GuardImage:
     def pack(self, axes: int) -> bytes:
         """The switch's bytes in the configuration of a board of so many axes."""
         weight = self.weight or (0,) * axes
-        used = any(weight)
-        return struct.pack(f"<B{axes}b", used | (used and self.closed) << 1, *weight)
+        is_used = any(weight)
+        return struct.pack(f"<B{axes}b", is_used | (is_used and self.closed) << 1, *weight)
 
 
 @dataclass(frozen=True)

@@ -269,9 +269,9 @@ def parse_reply(payload: bytes) -> Reply | None:
         _, tag, version, major, minor, *fields = _INFO.unpack(payload)
         return Info(tag, version, (major, minor), *fields)
     if kind == Type.STATUS and size >= _STATUS.size + 4 and (size - _STATUS.size) % 4 <= 1:
-        n, late = divmod(size - _STATUS.size, 4)
+        n, tail_size = divmod(size - _STATUS.size, 4)
         counts = struct.unpack_from(f"<{n}i", payload, _STATUS.size)
-        return Status(*(*_STATUS.unpack_from(payload)[1:], counts, payload[-1] if late else 0))
+        return Status(*(*_STATUS.unpack_from(payload)[1:], counts, payload[-1] if tail_size else 0))
     return None
 
 

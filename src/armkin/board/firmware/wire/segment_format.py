@@ -68,8 +68,8 @@ class Segment:
     @property
     def narrow(self) -> bool:
         """Whether it fits the short form: 8 bits for ticks, 16 for `add`, coarse rates."""
-        coarse = all(rate % COARSE_UNIT == 0 or abs(rate) == _MAX_RATE for rate in self.rates)
-        return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and coarse
+        is_coarse = all(rate % COARSE_UNIT == 0 or abs(rate) == _MAX_RATE for rate in self.rates)
+        return self.ticks <= 255 and self.bend == 0 and self.add % 256 == 0 and abs(self.add) < 1 << 23 and is_coarse
 
     @property
     def steps(self) -> tuple[int, ...]:
@@ -98,9 +98,9 @@ def _sent_rate(rate: int) -> int:
     return int(rate / COARSE_UNIT)
 
 
-def _full_rate(short: int) -> int:
+def _full_rate(sent_rate: int) -> int:
     """The rate [2^-23 steps a tick] of a coarse rate as it was sent."""
-    return short * COARSE_UNIT if abs(short) != FINE_BOUND - 1 else int(math.copysign(_MAX_RATE, short))
+    return sent_rate * COARSE_UNIT if abs(sent_rate) != FINE_BOUND - 1 else int(math.copysign(_MAX_RATE, sent_rate))
 
 
 def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Segment:
@@ -112,8 +112,8 @@ def whole_steps(ticks: int, interval: int, add: int, steps: Sequence[int]) -> Se
     (50, -100)
     """
     exact = (step * STEP / ticks for step in steps)
-    short = ticks <= 255
-    rates = (_coarse_rate(rate) if short else nearest_rate(rate) for rate in exact)
+    is_short = ticks <= 255
+    rates = (_coarse_rate(rate) if is_short else nearest_rate(rate) for rate in exact)
     return Segment(ticks, interval, add * 256, tuple(rates))
 
 
@@ -123,9 +123,9 @@ def pack_segment(segment: Segment, axes: Sequence[int], *, wide: bool) -> bytes:
     if not wide:
         return struct.pack(f"<BHh{len(rates)}h", ticks, interval, segment.add // 256, *map(_sent_rate, rates))
     fine = sum(1 << axis for axis, rate in zip(axes, rates, strict=True) if abs(rate) < FINE_BOUND)
-    short = (rate if abs(rate) < FINE_BOUND else _sent_rate(rate) for rate in rates)
+    sent_rates = (rate if abs(rate) < FINE_BOUND else _sent_rate(rate) for rate in rates)
     head = struct.pack("<HH", ticks, interval) + segment.add.to_bytes(3, "little", signed=True)
-    return head + struct.pack(f"<hH{len(rates)}h", segment.bend, fine | segment.quick << 15, *short)
+    return head + struct.pack(f"<hH{len(rates)}h", segment.bend, fine | segment.quick << 15, *sent_rates)
 
 
 def segment_size(axes: int, *, wide: bool) -> int:
@@ -136,11 +136,13 @@ def segment_size(axes: int, *, wide: bool) -> int:
 def read_segment(raw: bytes, axes: Sequence[int], *, wide: bool) -> Segment:
     """A segment of its bytes (for the simulated board)."""
     if not wide:
-        ticks, interval, add, *short = struct.unpack(f"<BHh{len(axes)}h", raw)
-        return Segment(ticks, interval, add * 256, tuple(map(_full_rate, short)))
+        ticks, interval, add, *sent_rates = struct.unpack(f"<BHh{len(axes)}h", raw)
+        return Segment(ticks, interval, add * 256, tuple(map(_full_rate, sent_rates)))
     ticks, interval = struct.unpack_from("<HH", raw)
-    bend, fine, *short = struct.unpack_from(f"<hH{len(axes)}h", raw, 7)
-    is_fine = (fine >> axis & 1 and rate != -FINE_BOUND for axis, rate in zip(axes, short, strict=True))
-    rates = tuple(rate if fine_rate else _full_rate(rate) for rate, fine_rate in zip(short, is_fine, strict=True))
+    bend, fine, *sent_rates = struct.unpack_from(f"<hH{len(axes)}h", raw, 7)
+    is_fine = (fine >> axis & 1 and rate != -FINE_BOUND for axis, rate in zip(axes, sent_rates, strict=True))
+    rates = tuple(
+        rate if sent_whole else _full_rate(rate) for rate, sent_whole in zip(sent_rates, is_fine, strict=True)
+    )
     add = int.from_bytes(raw[4:7], "little", signed=True)
     return Segment(ticks, interval, add, rates, bend, quick=bool(fine >> 15))

@@ -214,8 +214,8 @@ class Session:
                 self._status = reply
                 self.latest = reply if reply.page == 0 else self.latest
                 time_asked = self.line.take_answer(reply.tag)
-            if (taken := self._window.acknowledge(reply, time_asked)) or goes_on:
-                self.taken += taken
+            if (taken_frames := self._window.acknowledge(reply, time_asked)) or goes_on:
+                self.taken += taken_frames
                 self._renew_patience()
             if reply.error and self._error is None:
                 self._error = reply
@@ -285,9 +285,9 @@ def _between_questions(line: Line, window: Window, ends: bool) -> float:
     if line.unanswered > _MAX_UNANSWERED:  # more requests would fill the line and be lost
         return _POLL_PERIOD
     # One request fits beside the frames; on a bad line the last one may be lost.
-    late = window.late and (line.damaged or not line.unanswered)
+    is_late = window.late and (line.damaged or not line.unanswered)
     normal = _NOISY_POLL_PERIOD if line.damaged else _POLL_PERIOD
-    period = _QUICK_POLL_PERIOD if ends or window.out_of_credit or late else normal
+    period = _QUICK_POLL_PERIOD if ends or window.out_of_credit or is_late else normal
     return period / 2 if line.noisy else period
 
 
