@@ -13,7 +13,7 @@ from armkin.cli.boards import board_link, keep_outs
 from armkin.cli.boards.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.boards.keep_outs import Ignore, NoScene
 from armkin.cli.parsing import arguments, drawing_path, lock_and_sweep
-from armkin.cli.parsing.drawing_path import At, Feed, GripBy, Lift, Scale
+from armkin.cli.parsing.drawing_path import At, Feed, GripBy, Lift, Placement, Scale
 from armkin.cli.parsing.number_parsing import comma_separated, number, whole_number
 from armkin.cli.parsing.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
 from armkin.cli.printing import output, path_text, render
@@ -123,25 +123,15 @@ def path(
     arm = keep_outs.load_moving_arm(robot, scene, ignore_keep_out, tool)
     locked = lock_and_sweep.locked_radians(arm, lock)
     locked_arm = armkin.lock(arm, locked) if locked else arm
-    drawing_moves = drawing_path.drawing_moves(
-        locked_arm, file, task, at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by
-    )
+    placement = Placement(at=at, scale=scale, feed=feed, lift=lift, grip_by=grip_by)
+    drawing_moves = drawing_path.drawing_moves(locked_arm, file, task, placement)
     moves = _moves_of(locked_arm, file, via, task) if drawing_moves is None else drawing_moves
     output.check_destination(out, "a plan is", ".csv")
-    options: dict[str, Any] = {
-        "branch": branch,
-        "task": task,
-        "tolerance": None if tolerance is None else _number_from(tolerance, "--tolerance", 1e-6),
-        "corners": corners,
-        "blend": None if blend is None else _number_from(blend, "--blend", 0),
-        "speed": arguments.percent(speed, "--speed"),
-        "accel": arguments.percent(accel, "--accel"),
-        "tool_speed": None if tool_speed is None else _number_from(tool_speed, "--tool-speed", 1e-3),
-        "jerk": None if jerk is None else units.joints_in(arm, [_number_from(jerk, "--jerk", 1e-3)] * arm.n),
-        "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
-        "split": split,
-        "samples": None if samples is None else whole_number(samples, "--samples", 10, 1_000_000),
-    }
+    numbers = _path_numbers(
+        arm, tolerance=tolerance, blend=blend, speed=speed, accel=accel, tool_speed=tool_speed, jerk=jerk, near=near,
+        samples=samples,
+    )  # fmt: skip
+    options = {"branch": branch, "task": task, "corners": corners, "split": split, **numbers}
     if resume:
         board_link.can_resume(
             {"a plan": port is None, "--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM}
@@ -155,6 +145,31 @@ def path(
         return
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     _carry_out_path(question, link, out, plot, json=json)
+
+
+def _path_numbers(
+    arm: Arm,
+    *,
+    tolerance: str | None,
+    blend: str | None,
+    speed: str,
+    accel: str,
+    tool_speed: str | None,
+    jerk: str | None,
+    near: str | None,
+    samples: str | None,
+) -> dict[str, Any]:
+    """Options that are numbers, as `armkin.path` takes them. Raises UsageError for one out of range."""
+    return {
+        "tolerance": None if tolerance is None else _number_from(tolerance, "--tolerance", 1e-6),
+        "blend": None if blend is None else _number_from(blend, "--blend", 0),
+        "speed": arguments.percent(speed, "--speed"),
+        "accel": arguments.percent(accel, "--accel"),
+        "tool_speed": None if tool_speed is None else _number_from(tool_speed, "--tool-speed", 1e-3),
+        "jerk": None if jerk is None else units.joints_in(arm, [_number_from(jerk, "--jerk", 1e-3)] * arm.n),
+        "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
+        "samples": None if samples is None else whole_number(samples, "--samples", 10, 1_000_000),
+    }
 
 
 class _Question(NamedTuple):

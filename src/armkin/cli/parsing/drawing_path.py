@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -29,26 +29,27 @@ GripBy = Annotated[
 ]
 
 
-def drawing_moves(
-    arm: Arm,
-    file: str | None,
-    task: str | None,
-    *,
-    at: str | None,
-    scale: str | None,
-    feed: str | None,
-    lift: str | None,
-    grip_by: str | None,
-) -> PathFile | None:
+class Placement(NamedTuple):
+    """Where and how a drawing is drawn: the options as they are given."""
+
+    at: str | None
+    scale: str | None
+    feed: str | None
+    lift: str | None
+    grip_by: str | None
+
+
+def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Placement) -> PathFile | None:
     """The moves of a drawing; None: the file is none. Raises UsageError for options that make no sense."""
     from armkin import path_file
     from armkin.motion.drawings import drawing
 
-    options = {"--at": at, "--scale": scale, "--feed": feed, "--lift": lift, "--grip-by": grip_by}
     if file is None or path_file.drawing_language(file) is None:
-        if (first := next((name for name, value in options.items() if value is not None), None)) is not None:
-            raise UsageError(f"{first} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
+        if given := [name for name, value in placement._asdict().items() if value is not None]:
+            option = "--" + given[0].replace("_", "-")
+            raise UsageError(f"{option} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
         return None
+    at, scale, feed, lift, grip_by = placement
     if at is None:
         raise UsageError(f"{file} needs --at X,Y,Z, for example --at 300,0,50: where its zero lies in the arm's frame")
     if grip_by not in (None, "M3", "M106"):
