@@ -169,7 +169,7 @@ class _Rows:
         near = self.near[begin + pieces.row]
         q = _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
-            q = curves.settle(pieces, q)
+            q = curves.without_residual(pieces, q)
         near_rows = np.flatnonzero(self.stands[begin + pieces.row])
         q[near_rows] = _with_near(self.arm, self.joint, rows_of(pieces, near_rows), q[near_rows], near[near_rows])
         if self.arm.keep_out:

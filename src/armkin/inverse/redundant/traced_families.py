@@ -84,8 +84,8 @@ class Traced(NamedTuple):
         q, legal = nearest_row(self.follower.arm, points.q, self.follower.near[pieces.row])
         return q, legal & (points.step < tol.REACH)
 
-    def settle(self, pieces: Pieces, q: Array) -> Array:
-        """Postures (P, n) of pieces, without what `at` leaves, by steps of least norm."""
+    def without_residual(self, pieces: Pieces, q: Array) -> Array:
+        """Postures (P, n) of pieces, moved onto their targets from where `at` leaves them, by steps of least norm."""
         follower, q = self.follower, q.copy()
         for _ in range(LAST):
             residual, J = newton.scaled(follower.arm, follower.redundant.task, q, follower.target[pieces.row])
