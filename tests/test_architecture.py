@@ -60,15 +60,16 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/solvers inverse/tasks",
     "reachability/place": "keep_out errors files formula robot_file model columns engines inverse inverse/answers"
     " inverse/solvers inverse/tasks path_file motion motion/plan motion/path_planner reachability",
-    "export": "errors formula robot_file model forward inverse/tasks inverse/numeric inverse/elimination view",
+    "export": "keep_out errors formula robot_file model forward inverse/tasks inverse/numeric inverse/closed"
+    " inverse/elimination inverse/solvers view",
     "calibration": "errors formula robot_file model forward export inverse/tasks",
     "export/c": "export keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/closed inverse/elimination inverse/branches inverse/solvers",
     "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
-    " inverse/elimination inverse/branches keep_out motors export export/c",
+    " inverse/elimination inverse/branches keep_out motors export",
     "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
-    " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export/c columns"
-    " inverse/redundant user_folders",
+    " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export export/c"
+    " columns inverse/redundant user_folders",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion/plan motion/path_planner view"
     " reachability reachability/place",
     "board/ports": "errors user_folders",

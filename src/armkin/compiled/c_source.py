@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from armkin.export.c import arm_formulas, c_elimination, c_functions, c_program, keep_out_tables
+from armkin.export import arm_formulas, class_forms
+from armkin.export.c import c_elimination, c_functions, c_program, keep_out_tables
 from armkin.export.c.source_parts import part_text
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.numeric.tolerances import (
@@ -73,7 +74,7 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     commanded: the arm; arm: the same in actual joint values (`armkin.model.arm.actual_arm`), as branches have them.
     """
     solve, branches, level = "", 0, 3
-    if task is not None and geometry is not None and c_program.has_form(geometry):
+    if task is not None and geometry is not None and class_forms.has_form(geometry):
         solve, branches = c_program.candidates_code(
             arm, task, geometry, prefer=False, lanes="".join(map(_part_text, _LOCKSTEP))
         )

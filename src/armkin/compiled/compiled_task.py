@@ -14,7 +14,7 @@ from armkin.compiled.elimination_rows import CompiledElimination
 from armkin.compiled.joint_functions import THREAD_POSES, JointFunctions
 from armkin.compiled.one_target import Single
 from armkin.errors import UsageError
-from armkin.export.c import c_program
+from armkin.export import class_forms
 from armkin.formula import arrays
 from armkin.formula.arrays import Array
 from armkin.inverse import solve
@@ -47,7 +47,7 @@ class CompiledTask:
         self.turned = actual_arm(arm)  # formulas use actual joint values
         solved_task, form = _class_of(self.turned, task)
         if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
-            form = c_program.plain_form(self.turned, solved_task, form) if form.places is not None else form
+            form = class_forms.plain_form(self.turned, solved_task, form) if form.places is not None else form
         library = c_source.library(arm, self.turned, solved_task, form)
         code = toolchain.load_library(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64

@@ -19,14 +19,25 @@ if TYPE_CHECKING:
     from armkin.inverse.elimination.method import Elimination
     from armkin.inverse.elimination.pencil import Pencil
 
+PASSES = 4  # passes of the C code, of seven in Python; unsolved cases are reported as doubt
 OWN_PENCILS = 2  # special pencils of each kind of poses
+
+
+def has_form(elimination: Elimination) -> bool:
+    """Whether C and JavaScript can read all pencils for general poses."""
+    return bool(elimination.plans) and all(map(_is_read, elimination.plans[:PASSES]))
+
+
+def _is_read(pencil: Pencil) -> bool:
+    """Whether a pencil has the pose where roots.c and roots.js expect it: in La, Lb or Le, at full rank."""
+    return pencil.role.slot == 1 or (pencil.role.at_an_end and pencil.ends.rank == 9)
 
 
 def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
     """The pencils for each kind of poses; the first two are special for the kind, if the parts can read them."""
     special_pencils = [elimination.pencils_of_kind(kind)[:OWN_PENCILS] for kind in Kind]
     usual = elimination.plans[:passes]
-    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(is_read, pencils)) else usual for pencils in special_pencils]
+    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in special_pencils]
 
 
 def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:
@@ -34,11 +45,6 @@ def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list
     distinct = {(pencil.role, pencil.psi): pencil for plans in kinds for pencil in plans}
     numbers = {key: number for number, key in enumerate(distinct)}
     return list(distinct.values()), [[numbers[pencil.role, pencil.psi] for pencil in plans] for plans in kinds]
-
-
-def is_read(pencil: Pencil) -> bool:
-    """Whether a pencil has the pose where roots.c and roots.js expect it: in La, Lb or Le, at full rank."""
-    return pencil.role.slot == 1 or (pencil.role.at_an_end and pencil.ends.rank == 9)
 
 
 def pencil_arrays(pencil: Pencil) -> dict[str, Array | None]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.export.c.source_parts import part_text
-from armkin.export.elimination_data import frame_rows, is_read, moves_of, pencil_arrays, pencils_of, plans_of
+from armkin.export.elimination_data import PASSES, frame_rows, moves_of, pencil_arrays, pencils_of, plans_of
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.elimination.merge import weights
@@ -43,12 +43,6 @@ _NAMED = {  # numbers of the method, by their names in Python
     )
 }  # fmt: skip
 ACCEPTED = 1e-18  # bound of the squared residual of answers of the C code
-PASSES = 4  # passes of the C code, of seven in Python; unsolved cases are reported as doubt
-
-
-def has_form(elimination: Elimination) -> bool:
-    """Whether C can read all pencils for general poses."""
-    return bool(elimination.plans) and all(map(is_read, elimination.plans[:PASSES]))
 
 
 def candidates_code(

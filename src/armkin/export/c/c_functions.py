@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from armkin import forward
-from armkin.export.c import arm_formulas
+from armkin.export import arm_formulas
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.closed.subproblems import IN_DOUBLE, IN_SINGLE, recorded_for
 

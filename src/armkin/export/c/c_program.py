@@ -8,15 +8,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from armkin import __version__
 from armkin.errors import UsageError
-from armkin.export.c import arm_formulas, c_elimination, c_functions, keep_out_tables
+from armkin.export import arm_formulas
+from armkin.export.c import c_elimination, c_functions, keep_out_tables
 from armkin.export.c.golden_values import golden_test
 from armkin.export.c.source_parts import part_text
+from armkin.export.class_forms import has_form, plain_form, why_no_form
 from armkin.formula.arrays import Array
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.numeric.tolerances import CLOSE_DISTANCE, DECIMAL, FLOAT32
-from armkin.inverse.solvers import general
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import held_by_near, redundancy
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED
@@ -158,31 +159,6 @@ def candidates_code(
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
     return c_elimination.candidates_code(arm, task, geometry.elimination, lanes=lanes, held=held), MAX_ANSWERS
-
-
-def plain_form(arm: Arm, task: Task, geometry: Geometry) -> Geometry:
-    """The class itself, or the elimination if the class has no form in C but the elimination solves the arm."""
-    if has_form(geometry) or not geometry.complete or task.name != "pose" or arm.n != 6:
-        return geometry
-    elimination = general.recognise(arm, task)
-    return geometry if elimination is None or not has_form(elimination) else elimination
-
-
-def why_no_form(arm: Arm, geometry: Geometry) -> str:
-    """The reason why a class of arms cannot be written in C."""
-    if geometry.elimination is None and geometry.name.startswith("near "):
-        return "its branches are corrected ones of the class that it nearly fits, as many rounds as each needs"
-    if geometry.elimination is None:
-        return f"{arm.n} joints for a full pose are searched among the branches of a longer arm"
-    if int(arm.prismatic.sum()) == 3:
-        return "three of its joints are slides"
-    return "the pencils that are healthy on it are none of those that the C code reads"
-
-
-def has_form(geometry: Geometry) -> bool:
-    """Whether a class of arms can be written in C."""
-    elimination = geometry.elimination
-    return geometry.pairs is not None or (elimination is not None and c_elimination.has_form(elimination))
 
 
 def settings(single: bool = False) -> str:

@@ -13,10 +13,10 @@ import numpy as np
 
 from armkin import __version__, forward, motors
 from armkin.errors import UsageError
-from armkin.export.c import arm_formulas
-from armkin.export.c.c_program import has_form, plain_form, why_no_form
-from armkin.export.c.keep_out_tables import pair_tables
+from armkin.export import arm_formulas
+from armkin.export.class_forms import has_form, plain_form, why_no_form
 from armkin.export.js import js_elimination
+from armkin.export.keep_out_pairs import pair_tables
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
