@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.run import chunks, edges, folds
-from armkin.inverse.singular import components, local_structure
+from armkin.inverse.singular import components, local_structure, second_order
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 
@@ -36,7 +36,7 @@ def test_the_curvature_tells_what_the_followed_curve_tells(name: str, monkeypatc
     task, q = task_for(arm), beside_folds(arm)
     target = np.asarray(targets_of(task, armkin.fk(arm, q), q))
     short = local_structure.local_structure(arm, task, q, target)
-    monkeypatch.setattr(local_structure, "_second_order", lambda arm, task, q, *_: np.zeros_like(q))
+    monkeypatch.setattr(second_order, "decide", lambda arm, task, q, *_: np.zeros((2, len(q)), bool))
     long = local_structure.local_structure(arm, task, q, target)
     assert short.known.all()
     assert np.array_equal(short.known, long.known)

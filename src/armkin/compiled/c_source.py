@@ -36,7 +36,7 @@ from armkin.inverse.numeric.tolerances import (
     TINY,
     WEAK,
 )
-from armkin.inverse.singular import chains, local_structure, self_motions
+from armkin.inverse.singular import chains, local_structure, second_order, self_motions
 from armkin.inverse.singular.near_itself import COARSE_ROOM, ROOM
 from armkin.inverse.tasks.task import MAX_TARGET
 from armkin.model.limits import SLACK
@@ -163,7 +163,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
         "reach": arm.reach, "solution": SOLUTION, "closed": ROUNDING_RESIDUAL, "folded": FOLD_VALUE, "lost": WEAK,
         "seed": SEED_RESIDUAL, "close_by": CLOSE_DISTANCE, "smooth": SMOOTH_ERROR, "bent": FOLD_BEND, "wide": REACH,
         "way": FOLD_WAY,
-        "series": local_structure.SERIES, "tiny": TINY, "arrived": ARRIVED_STEP, "error": ERROR, "high": HIGH_ORDER,
+        "series": second_order.MAX_DISTANCE, "tiny": TINY, "arrived": ARRIVED_STEP, "error": ERROR, "high": HIGH_ORDER,
         "shrink": local_structure.SHRINK, "bend": local_structure.BEND, "moved": MOVED,
         "same": ROUNDING_DISTANCE, "turned": STILL_TURN, "drift": DRIFT,
         "nearer": local_structure.USED_SHARE, "shorter": local_structure.FAILED_RATIO,
@@ -171,7 +171,7 @@ def _fold_fields(arm: Arm, task: Task) -> dict[str, str]:
     }  # fmt: skip
     fields = {name: number_text(value) for name, value in values.items()}
     fields["motions"] = str(int(not arm.keep_out))  # with keep-outs, Python searches a self-motion for a free posture
-    fields |= {"back": str(local_structure.BACK), "full": str(int(task.orientation == "full"))}
+    fields |= {"back": str(second_order.BACK), "full": str(int(task.orientation == "full"))}
     fields |= {"iterations": str(local_structure.ITERATIONS), "shrinks": str(local_structure.SHRINKS)}
     fields |= {"fine": str(len(local_structure.FINE_GRID)), "points_count": str(len(local_structure.POINTS))}
     tables = {"points": local_structure.POINTS, "last": local_structure.TO_LAST}

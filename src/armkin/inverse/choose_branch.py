@@ -1,7 +1,6 @@
 """One answer for each target: the sorted branches of the whole arm, and the best one or the reason for none.
 
-It also handles joints that are held or swept. While `ik` returns arrays, these answers are for users and pages, in mm
-and degrees (`armkin.model.units`).
+It also handles joints that are held or swept. These answers are for users and pages, in mm and degrees.
 """
 
 import itertools

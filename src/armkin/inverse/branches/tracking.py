@@ -25,8 +25,7 @@ def follow_branches(arm: Arm, task: Task, q: Array, target: Array) -> Int:
     last. Returns (N, B): numbers from 0 to B - 1, each once in a row, -1 where there is no branch.
 
     Two branches of neighbouring targets are linked if each is the other's nearest, within
-    `STEP_DISTANCE`, and clearly so. Chains of links keep the number of their first branch; branches
-    without a link get the smallest free ones, in their order.
+    `STEP_DISTANCE`, and clearly so. Chains of links keep the number of their first branch; others get the least free.
     """
     N, B, _ = q.shape
     valid = ~np.isnan(q[:, :, 0])

@@ -156,8 +156,7 @@ def nearest_of_joint(arm: Arm, i: int, value: Array, near: Array) -> tuple[Array
 def turns(arm: Arm, q: ArrayLike, near: ArrayLike | None = None) -> Joints:
     """All copies of one branch within the limits, the one nearest to `near` first.
 
-    An unlimited revolute joint has infinitely many copies, of which only the nearest to `near` is given. Of equal
-    motions the copy above `near` is first.
+    Of the infinitely many copies of an unlimited joint that nearest to `near` is given, of two as near that above it.
 
     Args:
         arm: the arm, as `armkin.load` gives it.

@@ -2,8 +2,7 @@
 
 Four moving joints with parallel axes, or with axes that meet in a point, are a four-bar linkage while the tool keeps
 its pose, with tool and base as one bar. If the linkage can neither stretch nor fold at some joint, it has two
-circuits, and the sine of the angle there keeps its sign on each; else it has one circuit (Grashof 1883; Chiang,
-Kinematics of Spherical Mechanisms, 1988).
+circuits, the sine of the angle there of one sign on each; else one (Chiang, Kinematics of Spherical Mechanisms, 1988).
 """
 
 from typing import NamedTuple

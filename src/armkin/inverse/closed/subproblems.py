@@ -239,9 +239,8 @@ def quadratic(
 ) -> tuple[Entry, Doubt]:
     """Solve ``a d^2 + b d + c = 0`` for both roots d.
 
-    scale: a length of the size of d; least: the size of c below which, if all three are, the equation says
-    nothing; prefer: the d to give then. With d = scale tan(q/2) this is a `linear` problem, in which a
-    vanishing a is no special case: its root goes to infinity.
+    scale: a length of the size of d; least: the size of c below which, if all three are, the equation says nothing;
+    prefer: the d to give then. With d = scale tan(q/2) it is `linear`: where a vanishes its root goes to infinity.
     """
     a, b = arrays.mul(a, scale * scale), arrays.mul(b, scale)
     size = _absolute_sum((a, b, c))

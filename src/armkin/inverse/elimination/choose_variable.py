@@ -2,8 +2,7 @@
 
 A role says which joint is hidden, the variable, and in which order the others go; roles are rated on known poses.
 Most poses of an arm are alike, and one list of pencils serves them. Where axes 6 and 1 stand parallel or meet, tool up
-or down above all, the usual roles are singular or all but; these poses have a list of their own, with wide roles,
-prepared when the first such pose comes.
+or down above all, the usual roles are all but singular; such poses have a list of wide roles, made when one comes.
 """
 
 from dataclasses import dataclass
@@ -192,8 +191,7 @@ _WIDE_SEARCH = _SEARCH[:6]
 
 
 def _enough_roles(rated: list[_Rating], redundant: bool, last: bool) -> bool:
-    """Whether to try no more roles: three quick and exact ones that hide two different joints, or, once the
-    quick ones are all known, any that is healthy."""
+    """Whether to try no more roles: three quick, exact ones of two joints, or, the quick ones known, any good."""
     sound = [r for r in rated if r.error < EXCELLENT and r.left_open < OPEN_PART and r.pencil.size <= 16]
     if len(sound) >= 3 and len({rating.pencil.hidden_joint for rating in sound}) >= 2:
         return True

@@ -56,8 +56,7 @@ def run_pass(loop: Loop, pencil: Pencil, goal: Array, number: int) -> tuple[Answ
 def _own_roots(loop: Loop, pencil: Pencil, goal: Array, seed: roots.RootSeeds, polished: Polished, valid: Bool) -> Bool:
     """Which seeds led to an answer that has their own value of the hidden joint.
 
-    Around a value there are no more solutions than roots, and no two roots may have led to one answer. Near
-    singularities roots are too far off to say so.
+    Around a value there are as many solutions as roots at most, no two for one answer; not near singularities.
     """
     weakest = np.zeros(int(seed.pose.max(initial=-1)) + 1)
     np.maximum.at(weakest, seed.pose[valid], polished.weakness[valid])

@@ -55,10 +55,9 @@ def correct(
 ) -> tuple[Array, Array]:
     """Gauss-Newton with steps of least norm: q (M, n) moved onto its targets.
 
-    Returns the best q met and its `misses`. Singular values below `least` are left out of a step,
-    so that a singular posture is approached without running away. patience: steps in a row that take less than a
-    tenth away after which a start is given up; one at a root of sixth order takes two thirds. stalled: residual
-    below which such steps count.
+    Returns the best q met and its `misses`. Singular values below `least` are left out of a step, so that a singular
+    posture is approached without running away. patience: steps in a row that take less than a tenth away after which a
+    start is given up; one at a root of sixth order takes two thirds. stalled: residual below which such steps count.
     """
     unit = radian_or_reach(arm)
     q, best_q, best_size = q.copy(), q.copy(), np.full(len(q), np.inf)
@@ -215,8 +214,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Arra
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:
     """``function(matrix, *arguments)``, with noise of rounding size added to members that are singular.
 
-    Numpy raises for a whole stack of matrices if one of them has a zero pivot. The others are left as they are: what
-    becomes of a member does not depend on its neighbours.
+    Numpy raises for a whole stack of matrices if one of them has a zero pivot. The others are left as they are.
 
     Args:
         function: `np.linalg.inv`, `np.linalg.solve` and the like.

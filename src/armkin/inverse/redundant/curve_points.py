@@ -1,7 +1,6 @@
 """Points of curves of answers, onto which postures are moved in all joints, and cubics between them.
 
-By Newton's method with the tangent, or a joint that is held, as the last equation (Allgower and Georg, Numerical
-Continuation Methods, 1990, 2 and 6).
+By Newton's method, a tangent or held joint the last equation (Allgower, Georg: Numerical Continuation Methods, 1990).
 """
 
 from typing import NamedTuple, Self

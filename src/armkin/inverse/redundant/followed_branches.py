@@ -47,8 +47,7 @@ class Followed(NamedTuple):
         return cls(follower, stack_rows(parts), is_short, complete)
 
     def values_to_try(self, pieces: Pieces, near: Array) -> list[Array]:
-        """Values of the parameter (P,) that may hold the posture nearest to near (P, n), besides the best sample: where
-        near has the joint, and beside that sample."""
+        """Values of the parameter (P,) that may hold the posture nearest to near (P, n): its own, beside the best."""
         value = near[:, self.follower.redundant.joint]
         value = value + np.round((pieces.at - value) / (2 * np.pi)) * 2 * np.pi
         return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
@@ -59,8 +58,7 @@ class Followed(NamedTuple):
 
 
 def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
-    """Pieces of those of some targets whose curves change at angles (N, V) alone; which are short (N,), and which
-    targets those are (N,)."""
+    """Pieces of targets whose curves change at angles (N, V) alone; which are short, and which targets' (N,)."""
     summary = summary_of_samples(follower, over_a_turn(EVEN_SAMPLES), angles)
     changes = summary.crossed.at, summary.gone.at
     legal, present = ends = [place_between(summary.t, change, angles) for change in changes]

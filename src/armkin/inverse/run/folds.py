@@ -103,8 +103,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
 def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
     """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled`.
 
-    A Jacobian with one row more than columns is completed by a column `beside` (M, rows, 1), by default the direction
-    in which no joint moves the tool.
+    One row more than columns is completed by a column `beside` (M, rows, 1), by default what no joint reaches.
     """
     arm, task = goals.arm, goals.task
     T, slopes = tip_and_jacobian(arm, q)
@@ -123,8 +122,7 @@ def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> t
 def _decide_by_cubic(offset: Array, inverse: Array, end_inverse: Array) -> tuple[Bool, Bool]:
     """Which of P pairs with an offset (P, n) stand alone, and which meet, (P,), by inverses of their Jacobians.
 
-    The residual g along u is 0 at both ends; its slope on a curve that keeps all other numbers of the target is
-    1 / (v' J^-1 u).
+    The residual g along u is 0 at both ends; its slope on a curve that keeps all other numbers is 1 / (v' J^-1 u).
     """
     d = np.sqrt((offset * offset).sum(axis=1))
     v = _bordered_rows(offset / np.maximum(d, PAIR_DISTANCE)[:, None], inverse)

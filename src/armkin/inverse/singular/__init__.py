@@ -1,6 +1,7 @@
 """What a solution is at a singular posture: docs/solution.md.
 
 local_structure.py     the residual along the direction that a posture loses, and the component that it lies on
+second_order.py        the same by its second order alone: most boundaries and isolated roots
 chains.py              manifolds on which the residual grows, followed from end to end
 components.py          candidates of targets on an edge: which are one, isolated, a boundary or a self-motion manifold
 linkages.py            self-motions of two joints about one line and of four bars, at once

@@ -3,8 +3,7 @@
 At a posture J = U S V'. Where one singular value is small, the joints move along the last right singular vector v; all
 that the other directions can take away of the residual they take away (Lyapunov-Schmidt reduction; Golubitsky and
 Schaeffer, Singularities and Groups in Bifurcation Theory, 1985, ch. VII). What is left is a number g(t), t being the
-way along v, and a curve x(t). The component of the solution set is the interval of |g| <= SOLUTION around t = 0
-(docs/solution.md).
+way along v, and a curve x(t). The component is the interval of |g| <= SOLUTION around t = 0 (docs/solution.md).
 """
 
 from typing import Any, NamedTuple
@@ -15,6 +14,7 @@ from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
+from armkin.inverse.singular import second_order
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -30,9 +30,6 @@ USED_SHARE = 0.5  # share of a span by which what bounds the next one has come n
 STEPS = 200  # equal steps of a span: what exceeds `SOLUTION` within one does so by less than a thousandth
 # of a span, where |g| is compared
 POINTS = np.concatenate([[0.0], np.geomspace(tol.FIRST_POINT, 1.0 / STEPS, 24), np.arange(2, STEPS + 1) / STEPS])
-SIGNS = np.array([1.0, -1.0])[:, None, None]  # senses of a curve: both ways
-BACK = 5  # steps, at most, back onto the curve
-SERIES = 0.04  # distance [rad, reaches], at most, at which a series of second order is compared with g
 EXPONENTS = np.arange(NODES)
 POWERS_OF_POINTS = POINTS[:, None] ** EXPONENTS  # (points, NODES)
 FINE_GRID = np.linspace(0.0, 1.0, 33)[:, None]  # parameters of a component at which its slope is compared
@@ -92,7 +89,12 @@ def local_structure(arm: Arm, task: Task, q: Array, target: Array, linear: newto
         return curve
     full_span, is_short = curve.span.copy(), np.zeros(len(q), bool)
     if rows == n > 1:
-        w = _second_order(arm, task, q, target, linear, curve)
+        series = second_order.Series.at(arm, task, q, target, linear)
+        curve.known[...], curve.boundary[...] = second_order.decide(arm, task, q, target, linear, series)
+        curve.followed[...], (curve.low[...], curve.high[...]) = curve.known, series.ends()
+        w, span = series.w, curve.span[:, None]
+        curve.x[1], curve.x[2] = series.v * span, 0.5 * w * span**2
+        curve.g[1], curve.g[2] = series.sigma[:, None] * span, 0.5 * series.b[:, None] * span**2
         # the first span is twice as long as the component is by its second order
         estimate = 2.0 * np.maximum(-curve.low, curve.high)
         is_short = ~curve.known & (estimate > 0.0) & (2.0 * estimate < full_span) & (curve.second > tol.HIGH_ORDER)
@@ -163,62 +165,6 @@ def _follow_spans(arm: Arm, task: Task, starts: _Start, curve: Structure, rows: 
     return holds
 
 
-def _second_order(arm: Arm, task: Task, q: Array, target: Array, linear: newton.Linear, curve: Structure) -> Array:
-    """Decide those whose curvature does: g = sigma t + b t^2 / 2, as far as that tells, at most `SERIES`.
-
-    x(t) = v t + w t^2 / 2 keeps what the other directions reach to second order; b and w follow from differences
-    close by, the change of g'' from g where it decides, after steps back onto the curve; what these miss is counted.
-    Where sigma^2 > 2 SOLUTION |g''| as far as 2 SOLUTION / sigma, |g| passes `SOLUTION` there without a turn; where
-    sigma^2 < 2 SOLUTION |g''| as far as 4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
-    Writes what is decided, the ends and the series to `curve`; returns w (M, n).
-    """
-    n, unit, span = arm.n, radian_or_reach(arm), curve.span
-    r, U, S, V = linear
-    v, sigma = V[:, -1], S[:, -1]
-
-    def both_ways(way: Array) -> Array:
-        """How far the pose goes along U's columns, f (2, M, rows), where the joints go a way (2, M, n)."""
-        ends = (q + way * unit).reshape(-1, n)
-        goals = np.concatenate([target, target])
-        f = r - newton.residuals(arm, task, ends, goals).reshape(2, *r.shape)
-        return np.asarray((f[..., None] * U).sum(axis=2))
-
-    second_derivative = both_ways(SIGNS * tol.FOLD_WAY * v).sum(axis=0) / tol.FOLD_WAY**2
-    b, bend = second_derivative[:, -1], np.maximum(np.abs(second_derivative[:, -1]), tol.TINY)
-    inverse = V[:, :-1] / np.maximum(S[:, :-1], tol.WEAK)[:, :, None]
-    w = -(inverse * second_derivative[:, :-1, None]).sum(axis=1)
-    has_turn = sigma**2 < 2.0 * tol.SOLUTION * bend
-    h = np.where(has_turn, 4.0 * np.sqrt(tol.SOLUTION / bend), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY))
-    # what solves the target beside the curve must not pass for its ends
-    undecided = (h <= SERIES) & ((r * r).sum(axis=1) < tol.ROUNDING_RESIDUAL**2) & (S[:, -2] * h > 4.0 * tol.SOLUTION)
-    h = np.minimum(h, SERIES)
-    correction, last_offset = np.zeros((2, *v.shape)), np.inf
-    for _ in range(BACK):
-        if not undecided.any():
-            break
-        f = both_ways(0.5 * (h * h)[:, None] * w + SIGNS * h[:, None] * v + correction)
-        g, offset = f[:, :, -1], np.linalg.norm(f[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], tol.TINY)
-        cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
-        quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + n * h * offset
-        change = (6.0 * cubic + 12.0 * quartic) / h**2  # of g'', at most
-        turns = has_turn & (change < 0.2 * bend) & (sigma**2 < 2.0 * tol.SOLUTION * (bend - change))
-        passes = ~has_turn & (sigma**2 > 2.0 * tol.SOLUTION * (bend + change))
-        chord_error = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(correction, axis=2).max(axis=0) + offset
-        decided = undecided & (turns | passes) & (chord_error < 0.1 * h)
-        curve.followed[decided], curve.known[decided], curve.boundary[decided] = True, True, turns[decided]
-        undecided &= ~decided & (offset < 0.5 * last_offset)  # the next step must come closer to tell more
-        last_offset, correction = offset, correction - (inverse * f[:, :, :-1, None]).sum(axis=2)
-    # |g| is `SOLUTION` first at `exit_distance` where g has the sign of b, else at `other_exit`, or beyond the turn
-    exit_distance = 2.0 * tol.SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * tol.SOLUTION * bend))
-    root = np.sqrt(np.maximum(sigma**2 - 2.0 * tol.SOLUTION * bend, 0.0))
-    other_exit = 2.0 * tol.SOLUTION / np.maximum(sigma + root, tol.TINY)
-    other_exit = np.where(has_turn, exit_distance + 2.0 * sigma / bend, other_exit)
-    curve.low[...], curve.high[...] = np.where(b > 0.0, [-other_exit, exit_distance], [-exit_distance, other_exit])
-    curve.x[1], curve.x[2] = v * span[:, None], 0.5 * w * (span**2)[:, None]
-    curve.g[1, :, 0], curve.g[2, :, 0] = sigma * span, 0.5 * b * span**2
-    return np.asarray(w)
-
-
 def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Bool, Array, Array]:
     """Which curves (M,) stay at hand as far as their spans, how many times as long the next ones may be (M,), on which
     of these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k)."""
@@ -245,8 +191,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
     """Nodes of the curves of `_fit_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
     the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
 
-    Each is Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems,
-    1977).
+    Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems, 1977).
     """
     q, target, u, v, w, span = start
     M, n = q.shape

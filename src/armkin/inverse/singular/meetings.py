@@ -59,8 +59,7 @@ def separate(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost)
 
 @cache
 def _sample_directions(k: int) -> tuple[Array, Array, float]:
-    """Directions (P, k) in a plane or in space, their coordinates' products (k (k + 1) / 2, P), and how far [rad] any
-    direction is from one of these at most."""
+    """Directions (P, k), products of their coordinates (k (k + 1) / 2, P), and how far [rad] any is from these."""
     if k == 2:
         angle = np.linspace(0.0, np.pi, PLANE_DIRECTIONS, endpoint=False)
         unit, spacing = np.stack([np.cos(angle), np.sin(angle)], axis=1), np.pi / PLANE_DIRECTIONS
@@ -131,8 +130,7 @@ def _step_out(
 ) -> tuple[Int, Array, Bool]:
     """Postures (m, n) on self-motions that leave meetings (M, n), a long step off, and whose: (m,).
 
-    limit: (M,) residual of what counts as on one: points beside a self-motion of double roots have more. Also which
-    meetings (M,) all pushes end at.
+    limit: (M,) residual of what counts as on one: beside double roots it is more. Also which (M,) all pushes end at.
     """
     decided, meeting, push = _curve_tangents(arm, task, q, linear, nullity, target)
     rests, unsure = decided.copy(), np.flatnonzero(~decided)

@@ -102,9 +102,7 @@ def _about_one_line(J: Array, pair: Pair) -> Bool:
 
 
 def _joint_pairs(arm: Arm, J: Array, rests: Bool) -> list[tuple[Pair, Bool]]:
-    """Pairs of joints that are about one line in some posture in which those between them rest; all postures (M,) in
-    which they are about one.
-    """
+    """Pairs of joints that are about one line in a posture in which those between rest; (M,) where they are."""
     pairs = []
     for i, j in itertools.combinations(np.flatnonzero(~arm.prismatic).tolist(), 2):
         for sense in (1.0, -1.0):

@@ -2,8 +2,7 @@
 
 The roots of a class stand in pairs, along an axis of its branches. On an arm close to the class a pair continues
 another, wherever both are: real and apart, one, or complex. Seeds that lead to one root each need nothing more; the
-others, whose partners lie close to them, are found as pairs, which a fold does not disturb. Thus every root of the
-class is accounted for, or the target remains open.
+others, close to their partners, are found as pairs, through folds: all roots of the class, or the target stays open.
 
 Two roots are ``m + sqrt(w) u`` and ``m - sqrt(w) u``: real for ``w > 0``, complex for ``w < 0``, one at ``w = 0``. Half
 the sum of their residuals and half the difference over ``sqrt(w)`` are smooth in m, u and w, and their Jacobian is

@@ -75,8 +75,7 @@ def read_targets(task: Task, targets: ArrayLike) -> tuple[Array, tuple[int, ...]
     """Targets (..., m), or (..., 4, 4) for poses, as a flat batch (N, ...); its shape; defects of rotations (N,).
 
     A rotation that was rounded, to six decimals or to float32, is replaced by the nearest rotation.
-    Raises UsageError for a wrong shape, numbers that are not finite or too large, an axis of no
-    length or a matrix that is no rotation to 5e-6.
+    Raises UsageError for a wrong shape, numbers not finite or too large, an axis of no length, no rotation to 5e-6.
     """
     flat, lead = flat_targets(task, targets)
     rounding = np.zeros(len(flat))
