@@ -159,9 +159,9 @@ def _check_agreement(arm: Arm, q: Array, offset: Array) -> None:
     deviation = np.abs(q @ arm.motor_gain.T - offset)
     # each motor is rounded by up to half a pulse, and least squares may add all of this in one motor
     if np.any(deviation > 0.5 * np.sqrt(len(arm.motor_gain)) + _HALF):
-        worst = motor_names(arm)[np.unravel_index(np.argmax(deviation), deviation.shape)[-1]]
+        motor = motor_names(arm)[np.unravel_index(np.argmax(deviation), deviation.shape)[-1]]
         raise UsageError(
-            f"the pulses contradict each other: motor {worst} is {deviation.max():.1f} pulses from where "
+            f"the pulses contradict each other: motor {motor} is {deviation.max():.1f} pulses from where "
             "the other motors put its joints; motors of one joint must agree"
         )
 
@@ -228,12 +228,12 @@ def best_pulses(arm: Arm, q: ArrayLike) -> Best:
         )
     offsets = np.array(list(product(steps, repeat=motor_count)))
     flat_q, flat_x = values.reshape(-1, arm.n), exact.reshape(-1, motor_count)
-    chosen = np.empty((len(flat_q), motor_count), dtype=np.int64)
+    best_vectors = np.empty((len(flat_q), motor_count), dtype=np.int64)
     block = max(1, _AT_ONCE // len(offsets))
     for start in range(0, len(flat_q), block):
         rows = slice(start, start + block)
-        chosen[rows] = _nearest_pulses(arm, flat_q[rows], flat_x[rows], offsets)
-    return Best(rounding(arm, values, chosen.reshape(exact.shape)), rounding(arm, values), tried=len(offsets) + 1)
+        best_vectors[rows] = _nearest_pulses(arm, flat_q[rows], flat_x[rows], offsets)
+    return Best(rounding(arm, values, best_vectors.reshape(exact.shape)), rounding(arm, values), tried=len(offsets) + 1)
 
 
 def resolution(arm: Arm) -> Array:
@@ -309,9 +309,9 @@ def joints_per_pulse(arm: Arm) -> Array:
     """
     gain, idle = arm.motor_gain, undriven_joints(arm)
     if idle:
-        missing = "drives" if len(idle) == arm.n else f"motor for {', '.join(idle)}"
+        missing_text = "drives" if len(idle) == arm.n else f"motor for {', '.join(idle)}"
         raise UsageError(
-            f"{arm.name} has no {missing}; add motors: to its file, or drive: to each joint", undriven=idle
+            f"{arm.name} has no {missing_text}; add motors: to its file, or drive: to each joint", undriven=idle
         )
     # scale by the pulses of each joint, so that rad and mm, and coarse and fine drives, are comparable
     scale = np.abs(gain).max(axis=0)
@@ -336,9 +336,9 @@ def _nearest_pulses(arm: Arm, q: Array, exact: Array, corners: Array) -> Array:
     distance = np.linalg.norm(tip - position(arm, q)[:, None], axis=-1)
     distance[_is_worse_than_rounded(arm, candidates, actual)] = np.inf
     # rounded pulses come first, and argmin returns the first of equal values
-    best = np.argmin(distance, axis=1)
-    is_improved = distance[np.arange(len(q)), best] < distance[:, 0] * (1 - 1e-12)
-    return np.asarray(candidates[np.arange(len(q)), np.where(is_improved, best, 0)])
+    best_index = np.argmin(distance, axis=1)
+    is_improved = distance[np.arange(len(q)), best_index] < distance[:, 0] * (1 - 1e-12)
+    return np.asarray(candidates[np.arange(len(q)), np.where(is_improved, best_index, 0)])
 
 
 def _is_worse_than_rounded(arm: Arm, candidates: Array, actual: Array) -> NDArray[np.bool_]:

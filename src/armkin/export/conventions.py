@@ -63,11 +63,11 @@ def dh(arm: Arm, *, modified: bool = False) -> dict[str, Any]:
     last, tool = _split_last_link(arm, links[-1], modified)
     normals = [*map(_common_normal, links[1:-1]), last]
     # of each joint: what the link before it turns about and shifts along the joint's axis
-    before = [(theta, d), *((normal.theta_after, normal.d_after) for normal in normals[:-1])]
+    motions_before = [(theta, d), *((normal.theta_after, normal.d_after) for normal in normals[:-1])]
     twists = [(normal.alpha, normal.a) for normal in normals]
     twists = [(0.0, 0.0), *twists[:-1]] if modified else twists
     rows = []
-    for (alpha, a), (theta, d), normal in zip(twists, before, normals, strict=True):
+    for (alpha, a), (theta, d), normal in zip(twists, motions_before, normals, strict=True):
         angle, offset = _degrees(theta + normal.theta), tidy(d + normal.d, 12)
         rows.append({"dh": {"alpha": _degrees(alpha), "a": tidy(a, 12), "d": offset, "theta": angle}})
     keys = _file_keys(arm, "modified" if modified else "standard", rows, base, tool, {})
@@ -106,26 +106,26 @@ def tool_of(arm: Arm) -> Array:
 
 def _split_first_link(arm: Arm, link: Array) -> tuple[Array, float, float]:
     """The base, and the turn about and shift along the first axis that are part of the first link."""
-    inner = inverse(arm.base) @ link
-    if _is_screw_along_z(inner):
-        return arm.base, math.atan2(inner[1, 0], inner[0, 0]), float(inner[2, 3])
+    link_in_base = inverse(arm.base) @ link
+    if _is_screw_along_z(link_in_base):
+        return arm.base, math.atan2(link_in_base[1, 0], link_in_base[0, 0]), float(link_in_base[2, 3])
     return link, 0.0, 0.0
 
 
 def _split_last_link(arm: Arm, link: Array, modified: bool) -> tuple[_Normal, Array]:
     """The part of the last link that belongs to the last row, and the remaining tool."""
     tool = tool_of(arm)
-    inner = link @ inverse(tool)
-    theta = math.atan2(inner[1, 0], inner[0, 0])
+    link_to_tool = link @ inverse(tool)
+    theta = math.atan2(link_to_tool[1, 0], link_to_tool[0, 0])
     if modified:
-        if _is_screw_along_z(inner):
-            return _Normal(theta, float(inner[2, 3]), 0.0, 0.0), tool
+        if _is_screw_along_z(link_to_tool):
+            return _Normal(theta, float(link_to_tool[2, 3]), 0.0, 0.0), tool
         return _Normal(0.0, 0.0, 0.0, 0.0), link
     # Denavit and Hartenberg's conditions: the x axis of a row's frame is normal to the joint's axis and intersects it
-    x, p = inner[:3, 0], inner[:3, 3]
+    x, p = link_to_tool[:3, 0], link_to_tool[:3, 3]
     a = float(x[:2] @ p[:2])
     if abs(x[2]) < 1e-14 and np.abs(p[:2] - a * x[:2]).max() < MIN_DISTANCE:
-        return _Normal(theta, float(p[2]), a, math.atan2(inner[2, 1], inner[2, 2])), tool
+        return _Normal(theta, float(p[2]), a, math.atan2(link_to_tool[2, 1], link_to_tool[2, 2])), tool
     return _Normal(0.0, 0.0, 0.0, 0.0), link
 
 
@@ -228,11 +228,11 @@ def _keep_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
     """The file with a `pitch_offset` that keeps the zero of the targets' pitch."""
     for name in ("xyz_pitch", "xyz_pitch_roll"):
         try:
-            before = task_for(arm, name).offsets[0]
+            pitch = task_for(arm, name).offsets[0]
         except UsageError:
             continue
-        after = task_for(_build_arm({**robot, "pitch_offset": 0.0, "task": name}), name).offsets[0]
-        offset = _degrees(before - after)
+        pitch_without = task_for(_build_arm({**robot, "pitch_offset": 0.0, "task": name}), name).offsets[0]
+        offset = _degrees(pitch - pitch_without)
         robot = {k: v for k, v in robot.items() if k != "pitch_offset"}
         if offset:
             keys = list(robot)
@@ -247,13 +247,13 @@ def _keep_pitch(arm: Arm, robot: dict[str, Any]) -> dict[str, Any]:
 def differences(arm: Arm, keys: dict[str, Any]) -> list[str]:
     """Texts about angles of targets whose zero differs with the other table; [] for most arms."""
     try:
-        before, after = task_for(arm), task_for(_build_arm(keys))
+        task, new_task = task_for(arm), task_for(_build_arm(keys))
     except UsageError:
         return []
-    if before.name != after.name:
-        return [f"the task was {before.name} and is {after.name}"]
+    if task.name != new_task.name:
+        return [f"the task was {task.name} and is {new_task.name}"]
     lines = []
-    for label, zero, new_zero in zip(before.labels[before.position :], before.offsets, after.offsets, strict=False):
+    for label, zero, new_zero in zip(task.labels[task.position :], task.offsets, new_task.offsets, strict=False):
         if abs(turn := _degrees(new_zero - zero)) > 1e-9:
             lines.append(f"{label} counts from another zero: in targets it is {turn:g} deg more for the same pose")
     return lines
@@ -273,10 +273,11 @@ def _check_poses(arm: Arm, keys: dict[str, Any], links: Array) -> None:
             return
     sines = np.hypot(links[1:-1, 0, 2], links[1:-1, 1, 2])
     sines = np.where(sines > PARALLEL, sines, np.inf)
-    worst = int(np.argmin(sines))
-    angle = f"{math.degrees(sines[worst]):.2g}"
+    worst_joint = int(np.argmin(sines))
+    names = arm.joint_names[worst_joint : worst_joint + 2]
+    angle = f"{math.degrees(sines[worst_joint]):.2g}"
     raise UsageError(
-        f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {arm.joint_names[worst]} and "
-        f"{arm.joint_names[worst + 1]} are {angle} deg from parallel, so that their common normal is far away; "
+        f"{arm.name}: no DH table gives its poses to {COORDINATES:g} mm: the axes of {names[0]} and "
+        f"{names[1]} are {angle} deg from parallel, so that their common normal is far away; "
         "screws say it exactly"
     )

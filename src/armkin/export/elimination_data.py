@@ -36,8 +36,8 @@ def _is_read(pencil: Pencil) -> bool:
 def plans_of(elimination: Elimination, passes: int) -> list[tuple[Pencil, ...]]:
     """The pencils for each kind of poses; the first two are special for the kind, if the parts can read them."""
     special_pencils = [elimination.pencils_of_kind(kind)[:OWN_PENCILS] for kind in Kind]
-    usual = elimination.plans[:passes]
-    return [(*pencils, *usual[OWN_PENCILS:]) if all(map(_is_read, pencils)) else usual for pencils in special_pencils]
+    plans = elimination.plans[:passes]
+    return [(*pencils, *plans[OWN_PENCILS:]) if all(map(_is_read, pencils)) else plans for pencils in special_pencils]
 
 
 def pencils_of(kinds: list[tuple[Pencil, ...]]) -> tuple[list[Pencil], list[list[int]]]:

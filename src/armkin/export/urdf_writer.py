@@ -74,8 +74,8 @@ def _comment_text(arm: Arm) -> str:
     return text.replace("--", "- -").replace("\n", " ")
 
 
-def _free_name(name: str, used: tuple[str, ...]) -> str:
-    while name in used:
+def _free_name(name: str, used_names: tuple[str, ...]) -> str:
+    while name in used_names:
         name += "_"
     return name
 
@@ -112,8 +112,8 @@ def _real_text(value: float) -> str:
 
 
 def _link_lines(name: str, pieces: list[list[str]]) -> list[str]:
-    drawn = [line for piece in pieces for line in piece]
-    return [f'  <link name="{name}">', *drawn, "  </link>"] if drawn else [f'  <link name="{name}"/>']
+    piece_lines = [line for piece in pieces for line in piece]
+    return [f'  <link name="{name}">', *piece_lines, "  </link>"] if piece_lines else [f'  <link name="{name}"/>']
 
 
 def _body_lines(corners: Array, radius: float) -> list[list[str]]:

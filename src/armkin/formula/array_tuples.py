@@ -61,6 +61,6 @@ def widen_columns(array: NDArray[Any], width: int) -> NDArray[Any]:
     """An array (N, B, ...) padded to a number of columns with nan, False or -1."""
     if array.ndim < 2 or array.shape[1] >= width:
         return array
-    missing = {"f": np.nan, "b": False}.get(array.dtype.kind, -1)
+    missing_value = {"f": np.nan, "b": False}.get(array.dtype.kind, -1)
     pads = [(0, 0), (0, width - array.shape[1]), *[(0, 0)] * (array.ndim - 2)]
-    return np.pad(array, pads, constant_values=missing)
+    return np.pad(array, pads, constant_values=missing_value)

@@ -161,10 +161,10 @@ class _Writer:
         if b.constant == 0.0:
             return a
         if a.minus == b.minus:
-            plain = sorted((a._replace(minus=False), b._replace(minus=False)))
-            return _flip_sign(self.emit("add", plain), a.minus)
-        plus, less = (b, a) if a.minus else (a, b)
-        return self.emit("subtract", [plus._replace(minus=False), less._replace(minus=False)])
+            magnitudes = sorted((a._replace(minus=False), b._replace(minus=False)))
+            return _flip_sign(self.emit("add", magnitudes), a.minus)
+        plus, minus = (b, a) if a.minus else (a, b)
+        return self.emit("subtract", [plus._replace(minus=False), minus._replace(minus=False)])
 
     def emit(self, op: str, args: list[Value]) -> Value:
         """A new variable for an operation, or the one that holds it."""
@@ -172,8 +172,8 @@ class _Writer:
         if key not in self.values_by_key:
             name = f"t{len(self.lines)}"
             kind = self.language.boolean if op in BOOLEAN else self.language.real
-            plain = [f"({x})" if x.minus and k else str(x) for k, x in enumerate(args)]
-            self.lines.append(f"{kind} {name} = {self.language.operations[op].format(*plain)};")
+            texts = [f"({x})" if x.minus and k else str(x) for k, x in enumerate(args)]
+            self.lines.append(f"{kind} {name} = {self.language.operations[op].format(*texts)};")
             self.values_by_key[key] = Value(name)
         return self.values_by_key[key]
 
@@ -198,9 +198,9 @@ def write_code(recording: Recording, inputs: list[str], language: Language = C) 
 
     for node in recording.nodes:
         if node.op in FLIPS:
-            before = node.args[0]
+            argument = node.args[0]
             values[id(node)] = {
-                index: value(before, index_before_flip(node.op, index, node.axes)) for index in np.ndindex(*node.axes)
+                index: value(argument, index_before_flip(node.op, index, node.axes)) for index in np.ndindex(*node.axes)
             }
             continue
         values[id(node)] = {

@@ -34,10 +34,10 @@ class Buffer(NamedTuple):
 
 def workspace(buffers: list[Buffer], length: int) -> list[NDArray[Any]]:
     """The buffers for batches of that length."""
-    made: list[NDArray[Any]] = []
+    arrays: list[NDArray[Any]] = []
     for axes, dtype, full_index, part in buffers:
-        made.append(np.empty((*axes, length), dtype) if full_index < 0 else made[full_index][part])
-    return made
+        arrays.append(np.empty((*axes, length), dtype) if full_index < 0 else arrays[full_index][part])
+    return arrays
 
 
 class _Buffers:

@@ -85,5 +85,5 @@ def read_one(T: Array) -> list[float]:
 
 def read_pose(T: Array) -> Pose:
     """The entries of ``T (N, 4, 4)`` as contiguous arrays of length N."""
-    flat = np.ascontiguousarray(T[:, :3, :].reshape(len(T), 12).T)
-    return [flat[row * 4 + column] for column in range(4) for row in range(3)]
+    entries = np.ascontiguousarray(T[:, :3, :].reshape(len(T), 12).T)
+    return [entries[row * 4 + column] for column in range(4) for row in range(3)]

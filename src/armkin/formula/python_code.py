@@ -66,8 +66,8 @@ def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     lines, expressions = _write_lines(steps, _count_uses(steps, outputs), inputs)
     returned = []
     for x, branches in zip(recording.outputs, outputs, strict=True):
-        joined = ", ".join(_expression(value, expressions).code for value in branches)
-        returned.append(f"({joined},)" if axes_of(x) else joined)
+        codes = ", ".join(_expression(value, expressions).code for value in branches)
+        returned.append(f"({codes},)" if axes_of(x) else codes)
     return function_of(list(inputs.values()), lines, returned, dict(_FUNCTIONS))
 
 
@@ -107,7 +107,7 @@ def _count_uses(steps: list[Step], outputs: list[list[Value | str]]) -> Counter[
 
 def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
     """The operations on single branches without flips and signs, and the values of each output on its branches."""
-    same: dict[Value, Value | str] = {}
+    alias_of: dict[Value, Value | str] = {}
 
     def value(x: Any, index: tuple[int, ...]) -> Value | str:
         """The argument on a branch: a value, or the text of a constant."""
@@ -115,7 +115,7 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
         last = index[len(index) - len(axes) :]
         place = tuple(0 if size == 1 else i for size, i in zip(axes, last, strict=True))
         if isinstance(x, Node):
-            return same.get(key := (id(x), place), key)
+            return alias_of.get(key := (id(x), place), key)
         return repr(float(np.asarray(x)[(*place, 0)] if np.ndim(x) else x))
 
     steps: list[Step] = []
@@ -124,11 +124,11 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
         for index in np.ndindex(*node.axes):
             output = id(node), index
             if node.op in FLIPS:
-                same[output] = value(node.args[0], index_before_flip(node.op, index, node.axes))
+                alias_of[output] = value(node.args[0], index_before_flip(node.op, index, node.axes))
                 continue
             op, args = _shorten(node.op, [value(x, index) for x in node.args], minus)
             if op == "same":
-                same[output] = args[0]
+                alias_of[output] = args[0]
                 continue
             if op == "negative":
                 minus[output] = args[0]

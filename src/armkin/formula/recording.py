@@ -146,9 +146,9 @@ class Trace:
         """The product of two factors, with constants combined: ``k1 (k2 x)`` is one operation."""
         for k, x in ((a, b), (b, a)):
             if not isinstance(k, Node) and isinstance(x, Node) and x.op == "multiply":
-                for inner, y in (x.args, x.args[::-1]):
-                    if not isinstance(inner, Node):
-                        return self.simplify("multiply", (k * inner, y))
+                for factor, y in (x.args, x.args[::-1]):
+                    if not isinstance(factor, Node):
+                        return self.simplify("multiply", (k * factor, y))
         return self.record("multiply", (a, b))
 
     def record(self, op: str, inputs: Sequence[Any]) -> Node:

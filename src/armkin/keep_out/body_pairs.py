@@ -110,10 +110,11 @@ class Guard:
         of the segments (S, N), by which they may be nearer."""
         middle, direction = (a + b) / 2, b - a
         half_length = np.sqrt(np.einsum("ksn,ksn->sn", direction, direction)) / 2
-        radius, moving = self._segment_radius[:, None], self.moving
+        radius = self._segment_radius[:, None]
         i, j = self.ours, self.theirs
-        distances = [shape.of_points(middle[:, moving]) - radius[moving] for _, shape in self.obstacles]
-        half_lengths = [half_length[moving]] * len(distances)
+        moving_middles, moving_radius = middle[:, self.moving], radius[self.moving]
+        distances = [shape.of_points(moving_middles) - moving_radius for _, shape in self.obstacles]
+        half_lengths = [half_length[self.moving]] * len(distances)
         if len(i):
             offset = middle[:, i] - middle[:, j]
             distances.append(np.sqrt(np.einsum("ksn,ksn->sn", offset, offset)) - radius[i] - radius[j])
@@ -173,7 +174,7 @@ def _guard_of_pairs(
     """The guard for obstacles and for pairs (later, earlier) of bodies; left_out: names of ignored pairs."""
     arm_bodies = bodies(arm)
     solid = [body for body in range(1, arm.n + 1) if arm_bodies.exists(body)]
-    moving = np.flatnonzero(np.isin(arm_bodies.owner, solid))
+    moving_segments = np.flatnonzero(np.isin(arm_bodies.owner, solid))
     segments = [np.flatnonzero(arm_bodies.owner == body) for body in range(arm.n + 1)]
     segment_pairs = [[(i, j) for i in segments[later] for j in segments[earlier]] for later, earlier in pairs]
     rows = np.array([segment_pair for part in segment_pairs for segment_pair in part], dtype=np.intp).reshape(-1, 2)
@@ -186,8 +187,8 @@ def _guard_of_pairs(
         obstacles=obstacles,
         pairs=tuple(named_pairs),
         left_out=left_out,
-        moving=moving,
-        first=np.flatnonzero(np.diff(arm_bodies.owner[moving], prepend=-1)),
+        moving=moving_segments,
+        first=np.flatnonzero(np.diff(arm_bodies.owner[moving_segments], prepend=-1)),
         ours=rows[:, 0],
         theirs=rows[:, 1],
         starts=np.cumsum([0, *sizes[:-1]], dtype=np.intp) if sizes else np.empty(0, np.intp),

@@ -169,8 +169,8 @@ def _screw_factors(joint: Joint) -> _JointFactors:
     B[:3, 3] = point
     frame_after = np.eye(4)
     frame_after[:3, 3] = point
-    back = inverse(B)
-    return _JointFactors(before=B, after=back, frame=back @ frame_after)
+    B_inverse = inverse(B)
+    return _JointFactors(before=B, after=B_inverse, frame=B_inverse @ frame_after)
 
 
 def _perpendicular(z: Array) -> Array:

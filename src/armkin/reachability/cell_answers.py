@@ -129,9 +129,9 @@ class _Answers:
         self.length: NDArray[Any] = legal.astype(np.intp)
         if question.by_arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
-            inner = solutions.valid & cells_inside(self.arm, solutions.q, range(1, last))
+            is_inside = solutions.valid & cells_inside(self.arm, solutions.q, range(1, last))
             self.first, length = legal_arc(self.arm, solutions.q[:, :, 0], 0, question.turns, 1)
-            self.length = np.where(inner, length, 0)
+            self.length = np.where(is_inside, length, 0)
             if question.roll_arcs:
                 rolls = question.roll_words
                 sense = 1 if self.arm.link[-1][2, 2] > 0 else -1
@@ -148,10 +148,10 @@ class _Answers:
         ring = edges.rows // orientations
         for name, values in edges.counts.items():
             np.add.at(sums[name], ring, values)
-        reached, total = sums["reached"], orientations * self.count
+        reached_count, total = sums["reached"], orientations * self.count
         with np.errstate(divide="ignore", invalid="ignore"):
-            mean = sums["legal"] / reached  # nan if no orientation is reached
-        shares = {"share": reached, "share_any": sums["anywhere"], "branches": mean, "single": sums["single"]}
+            mean = sums["legal"] / reached_count  # nan if no orientation is reached
+        shares = {"share": reached_count, "share_any": sums["anywhere"], "branches": mean, "single": sums["single"]}
         columns = {name: values if name == "branches" else values / total for name, values in shares.items()}
         if self.question.measures:
             columns |= self._measures(orientations, M)
@@ -170,8 +170,8 @@ class _Answers:
         of branch and roll; and (S, 1): rolls of solves that have any branch."""
         weight = float(self.count if self.question.round_rolls else 1)
         S, P = self.places.shape
-        once: Words = np.zeros((S, P, self.rolls.shape[-1]), np.uint64)
-        twice: Words = np.zeros_like(once)
+        at_least_once: Words = np.zeros((S, P, self.rolls.shape[-1]), np.uint64)
+        at_least_twice: Words = np.zeros_like(at_least_once)
         legal = np.zeros((S, P))
         roll_counts = _count_bits(self.rolls)
         for branch in range(self.first.shape[1]):
@@ -180,15 +180,15 @@ class _Answers:
             on_arc = steps_on_arc < self.length[:, branch, None]
             legal += on_arc * roll_counts[:, branch, None]
             rolls_there = -on_arc.astype(np.int64).view(np.uint64)[:, :, None] & self.rolls[:, branch, None, :]
-            twice |= once & rolls_there
-            once |= rolls_there
-        anywhere = np.any(self.valid, axis=1, keepdims=True) * float(self.count)
+            at_least_twice |= at_least_once & rolls_there
+            at_least_once |= rolls_there
+        anywhere_count = np.any(self.valid, axis=1, keepdims=True) * float(self.count)
         counts = {
-            "reached": weight * _count_bits(once),
-            "single": weight * _count_bits(once & ~twice),
+            "reached": weight * _count_bits(at_least_once),
+            "single": weight * _count_bits(at_least_once & ~at_least_twice),
             "legal": weight * legal,
         }
-        return counts | {"anywhere": anywhere}
+        return counts | {"anywhere": anywhere_count}
 
     def _sum_over_solves(self, values: Array, orientations: int, M: int) -> Array:
         """Sums over the solves of a cell, (S, P) or (S, 1) -> (R, M); a value holds from its place to the next one."""
@@ -245,10 +245,12 @@ class _Answers:
         for name, values in measures.items():
             legal_values = np.full(legal.shape, -np.inf)
             legal_values[is_legal] = np.where(np.isnan(values), -np.inf, values)
-            best = np.where(legal, legal_values, -np.inf).max(axis=1, initial=-np.inf)
-            best = best.reshape(-1, orientations, best.shape[1]).max(axis=1)
-            best = np.where(np.isfinite(best), np.abs(best) if name == "step_error_mm" else best, np.nan)
-            measures[name] = np.asarray(np.broadcast_to(best, (len(best), M)))
+            best_values = np.where(legal, legal_values, -np.inf).max(axis=1, initial=-np.inf)
+            best_values = best_values.reshape(-1, orientations, best_values.shape[1]).max(axis=1)
+            best_values = np.where(
+                np.isfinite(best_values), np.abs(best_values) if name == "step_error_mm" else best_values, np.nan
+            )
+            measures[name] = np.asarray(np.broadcast_to(best_values, (len(best_values), M)))
         return measures
 
     def _margins(self, q: Array, M: int) -> Array:

@@ -53,10 +53,10 @@ class Grid:
                 f"tool_down: task {self.task.name} does not prescribe where the tool's z axis points; "
                 "tasks pose, xyz_axis and those with a pitch do"
             )
-        most = self.arm.reach / self.step
-        if most * (2 * most + 1) * self.azimuths > 2 * MAX_CELLS:
+        cells_across = self.arm.reach / self.step
+        if cells_across * (2 * cells_across + 1) * self.azimuths > 2 * MAX_CELLS:
             raise UsageError(
-                f"grid: cells of {self.step:g} mm are some {most * (2 * most + 1) * self.azimuths:.1g} "
+                f"grid: cells of {self.step:g} mm are some {cells_across * (2 * cells_across + 1) * self.azimuths:.1g} "
                 f"within a reach of {self.arm.reach:.0f} mm; {MAX_CELLS:,} at most: take a coarser grid",
                 most=MAX_CELLS,
             )
@@ -183,9 +183,9 @@ def _pitch_down(arm: Arm, task: Task) -> float:
     """The pitch at which the tool's z axis points down [rad]. Raises UsageError if there is none."""
     q = arm.home.copy()
     joint = int(np.flatnonzero(task.sums[0])[0])
-    moved = q.copy()
-    moved[joint] += 0.1
-    z, z_moved = fk(arm, q)[:3, 2], fk(arm, moved)[:3, 2]
+    moved_q = q.copy()
+    moved_q[joint] += 0.1
+    z, z_moved = fk(arm, q)[:3, 2], fk(arm, moved_q)[:3, 2]
     axis = np.cross(z, z_moved)
     down = np.array([0.0, 0.0, -1.0])
     size = np.linalg.norm(axis)

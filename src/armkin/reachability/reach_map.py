@@ -233,12 +233,12 @@ class _Run:
 
     def _count(self, chunk: RingChunk, table: Table) -> None:
         grid = self.question.grid
-        reached = np.asarray(table["share"]) > 0
+        is_reached = np.asarray(table["share"]) > 0
         radius = np.repeat((chunk.rings[:, 0] + 0.5) * grid.step, grid.azimuths)
-        self.volume += float(radius[reached].sum()) * grid.step**2 * TURN / grid.azimuths
-        self.reached += int(reached.sum())
+        self.volume += float(radius[is_reached].sum()) * grid.step**2 * TURN / grid.azimuths
+        self.reached += int(is_reached.sum())
         self.solves += len(chunk.rings) * self.question.solves_a_ring
-        self.cells += len(reached)
+        self.cells += len(is_reached)
         if self.progress is not None:
             self.progress(self.cells)
 

@@ -84,14 +84,14 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # most cells finer than that stay empty
     cells = _Cells(section, low, high, _LINE if dimensions == 2 else side)
     _fill_cells(cells, rng, _UNIFORM, _GROWN, chunk)
-    best = _least_error_level(cells)
-    shape = " x ".join(str(k) for k in best.cells.shape)
+    level = _least_error_level(cells)
+    shape = " x ".join(str(k) for k in level.cells.shape)
     sweep = "a full turn" if section.closed else "its range"
     method = (
         f"{shape} cells of equal area in a section, swept exactly by {arm.joint_names[0]} over {sweep}; "
         "border cells count half; the error is that half and the change with cells of twice the size"
     )
-    return Extent(dimensions, best.value, best.error, method)
+    return Extent(dimensions, level.value, level.error, method)
 
 
 class _Level(NamedTuple):
@@ -105,13 +105,13 @@ class _Level(NamedTuple):
 def _least_error_level(cells: _Cells) -> _Level:
     """The best of these cells and those of twice, four times, ... the size."""
     levels = [cells]
-    while (coarse := levels[-1].merge_cells()) is not None:
-        levels.append(coarse)
+    while (merged := levels[-1].merge_cells()) is not None:
+        levels.append(merged)
     brackets = np.array([level.bracket() for level in levels])
     middles = brackets.mean(axis=1)
     errors = 0.5 * np.diff(brackets, axis=1)[:-1, 0] + np.abs(np.diff(middles))
-    best = int(np.argmin(errors))
-    return _Level(levels[best], float(middles[best]), float(errors[best]))
+    best_index = int(np.argmin(errors))
+    return _Level(levels[best_index], float(middles[best_index]), float(errors[best_index]))
 
 
 def tip_freedoms(arm: Arm) -> tuple[Array | None, int]:
@@ -206,12 +206,12 @@ class _Cells:
         """Cells of twice the size with the same starts; None for 32 cells or fewer along a side."""
         if self.shape[0] <= 32:
             return None
-        coarse = _Cells(self.section, self.low, self.high, self.shape[0] // 2)
-        pairs = [k for n in coarse.shape for k in (n, 2)] + [self.stretches]
-        inner = tuple(range(1, 2 * len(self.shape), 2))
-        coarse.start_low = self.start_low.reshape(pairs).min(axis=inner).ravel()
-        coarse.start_high = self.start_high.reshape(pairs).max(axis=inner).ravel()
-        return coarse
+        merged = _Cells(self.section, self.low, self.high, self.shape[0] // 2)
+        pairs = [k for n in merged.shape for k in (n, 2)] + [self.stretches]
+        pair_axes = tuple(range(1, 2 * len(self.shape), 2))
+        merged.start_low = self.start_low.reshape(pairs).min(axis=pair_axes).ravel()
+        merged.start_high = self.start_high.reshape(pairs).max(axis=pair_axes).ravel()
+        return merged
 
     def swept_lengths(self) -> Array:
         """Length swept at each cell: (cells...) [rad | mm]."""

@@ -200,8 +200,8 @@ class _Tally:
         self.nearest, self.farthest = min(self.nearest, part.nearest), max(self.farthest, part.farthest)
         self.least, self.most = np.minimum(self.least, part.least), np.maximum(self.most, part.most)
         if self._share > 0:
-            chosen = self._rng.random(part.samples) < self._share if self._share < 1 else slice(None)
-            self._chosen_samples.append(np.column_stack([part.q, part.tip, *part.values])[chosen])
+            kept_samples = self._rng.random(part.samples) < self._share if self._share < 1 else slice(None)
+            self._chosen_samples.append(np.column_stack([part.q, part.tip, *part.values])[kept_samples])
 
     def result(self, names: Sequence[str], size: Extent | None, seconds: float) -> Workspace:
         """The survey of all samples; names: of the measures, size: the volume or area."""

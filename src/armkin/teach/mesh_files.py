@@ -113,21 +113,21 @@ def _transformation(tag: str, values: list[float]) -> Array:
 def _geometry_triangles(mesh: Any) -> Iterator[Array]:
     """The triangles of a geometry, from its triangles, polylists and polygons, which are assumed to be convex."""
     sources = dict(_source_arrays(mesh))
-    vertices = {one.get("id"): one for one in mesh.findall("vertices")}
+    vertices = {node.get("id"): node for node in mesh.findall("vertices")}
     for kind, index_of in _INDEX_OF.items():
         for group in mesh.findall(kind):
             inputs = group.findall("input")
-            width = 1 + max(int(one.get("offset", 0)) for one in inputs)
+            width = 1 + max(int(node.get("offset", 0)) for node in inputs)
             vertex = _input_of(inputs, "VERTEX")
             owner = vertices[vertex.get("source", "").removeprefix("#")]
             place = _input_of(owner.findall("input"), "POSITION")
             points = sources[place.get("source", "").removeprefix("#")][:, :3]
-            lists = [np.array((one.text or "").split(), dtype=np.int64) for one in group.findall("p")]
-            corners = [one.reshape(-1, width)[:, int(vertex.get("offset", 0))] for one in lists]
-            for one in index_of(group, corners):
-                if len(one) and (one.min() < 0 or one.max() >= len(points)):
+            lists = [np.array((node.text or "").split(), dtype=np.int64) for node in group.findall("p")]
+            corners = [indices.reshape(-1, width)[:, int(vertex.get("offset", 0))] for indices in lists]
+            for triangles in index_of(group, corners):
+                if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(points)):
                     raise ValueError("a triangle names a vertex that is not there")
-                yield points[one]
+                yield points[triangles]
 
 
 def _input_of(inputs: list[Any], semantic: str) -> Any:

@@ -45,11 +45,11 @@ class Question:
 
 def answer_question(arm: Arm, question: Question, quick: QuickIk | None = None) -> dict[str, Any]:
     """The answer as JSON in mm and degrees; quick: solves by machine code, which is built on demand."""
-    solved = _branches_json(arm, question, quick)
-    q = solved.pop("q", question.q)
+    answer = _branches_json(arm, question, quick)
+    q = answer.pop("q", question.q)
     T = fk(arm, q) + 0.0  # no -0.0
     return {
-        **solved,
+        **answer,
         "q": units.joints_out(arm, q).tolist(),
         "outside": _warnings(arm, q),
         "red": _hit_bodies(arm, q),
@@ -148,8 +148,8 @@ def _shown_fields(
         return {"chosen": _branch_of_pose(branches, question.q)}
     if answer_set.within_limits:
         stay = [k for k, branch in enumerate(branches) if branch.within_limits and branch.name == question.branch]
-        chosen = stay[0] if stay else 0  # the first branch, free of hits if possible
-        return {"chosen": chosen, "q": branches[chosen].q}
+        branch_index = stay[0] if stay else 0  # the first branch, free of hits if possible
+        return {"chosen": branch_index, "q": branches[branch_index].q}
     if not question.nearest:
         return {}
     [nearest] = choose_branch.closest(request, goal[None])

@@ -56,8 +56,8 @@ class QuickIk:
         from armkin.compiled.compiled_arm import compile
 
         with suppress(ArmkinError):  # without a compiler or a folder to build in, Python is used
-            built = compile(arm, task)
+            compiled_arm = compile(arm, task)
             home = targets_of(solver(actual_arm(arm), task)[0], fk(arm, arm.home)[None], arm.home[None])
-            built.ik(home, task, arm.home)  # the task's own library
-            self._built = built
+            compiled_arm.ik(home, task, arm.home)  # the task's own library
+            self._built = compiled_arm
         self.ready.set()

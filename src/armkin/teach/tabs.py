@@ -118,7 +118,7 @@ class Tabs:
                     tab.publish(topic, message)
 
     def _announce(self) -> None:
-        other = "another" if self._control else "nobody"
+        other_holder = "another" if self._control else "nobody"
         for tab in self._tabs.values():
-            holder = "yours" if self._control == tab.id else other
+            holder = "yours" if self._control == tab.id else other_holder
             tab.publish("control", {"holder": holder, "pages": len([t for t in self._tabs.values() if t.listening])})

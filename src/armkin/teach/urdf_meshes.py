@@ -35,15 +35,18 @@ def meshes_json(arm: Arm, path: str) -> dict[str, Any]:
     bodies = _body_triangles(arm, path)
     unit = arm.reach / _GRID_DIVISOR
     while True:
-        coarse = [_on_grid(body, unit) for body in bodies]
-        if sum(map(len, coarse)) <= MAX_TRIANGLES:
+        rounded_bodies = [_on_grid(body, unit) for body in bodies]
+        if sum(map(len, rounded_bodies)) <= MAX_TRIANGLES:
             break
         unit *= _GRID_FACTOR
-    if not any(map(len, coarse)):
+    if not any(map(len, rounded_bodies)):
         raise UsageError(f"{path}: has no meshes of this arm in its <visual> elements")
-    if max(int(np.abs(body).max(initial=0)) for body in coarse) > 32_767:
+    if max(int(np.abs(body).max(initial=0)) for body in rounded_bodies) > 32_767:
         raise UsageError(f"{path}: a mesh is more than 30 times as large as the arm: are its units metres?")
-    return {"unit": unit, "bodies": [base64.b64encode(body.astype("<i2").tobytes()).decode() for body in coarse]}
+    return {
+        "unit": unit,
+        "bodies": [base64.b64encode(body.astype("<i2").tobytes()).decode() for body in rounded_bodies],
+    }
 
 
 def _on_grid(body: Array, unit: float) -> Array:

@@ -51,12 +51,12 @@ def candidates_code(
     elimination: Elimination,
     passes: int = PASSES,
     lanes: str = "",
-    held: Redundancy | None = None,
+    redundant: Redundancy | None = None,
 ) -> str:
     """`arm_candidates` for an arm that the elimination solves, with its data and functions.
 
     lanes: C code in which `arm_first_pass` solves several poses together, for processors with vectors and arms without
-    slides. held: the redundant joint, which is held at its value in near; the elimination is that of the others.
+    slides. redundant: its joint is held at its value in near; the elimination is that of the others.
     """
     kinds = plans_of(elimination, passes)
     pencils, numbers_of = pencils_of(kinds)
@@ -78,9 +78,9 @@ def candidates_code(
     text += part_text("candidates")
     if task.orientation == "axis":
         text = text.replace("arm_candidates", "arm_six_candidates") + _with_virtual_joint()
-    if held is not None:
+    if redundant is not None:
         text = text.replace("ARM_JOINTS", str(arm.n - 1)).replace("arm_candidates", "arm_other_candidates")
-        text += _with_held_joint(arm, held)
+        text += _with_held_joint(arm, redundant)
     return text
 
 
@@ -144,23 +144,23 @@ def _with_virtual_joint() -> str:
     return part_text("virtual_joint").replace("@lines@", "\n        ".join(lines))
 
 
-def _with_held_joint(arm: Arm, held: Redundancy) -> str:
+def _with_held_joint(arm: Arm, redundant: Redundancy) -> str:
     """`arm_candidates` of an arm whose redundant joint is held at its value in near."""
-    size = 12 if held.task.orientation == "full" else len(held.task.labels)
+    size = 12 if redundant.task.orientation == "full" else len(redundant.task.labels)
     inputs = [f"goal[{k} * ARM_LANES + i]" for k in range(size)]
-    held_value = f"near[{held.joint} * ARM_LANES + i]"
+    held_value = f"near[{redundant.joint} * ARM_LANES + i]"
     inputs += [f"ARM_COS({held_value})", f"ARM_SIN({held_value})"]
-    recorded = recording.record(lambda x: move_entries(arm, held, x[:size], Pair(*x[size:])), len(inputs))
+    recorded = recording.record(lambda x: move_entries(arm, redundant, x[:size], Pair(*x[size:])), len(inputs))
     code = c_and_js_code.write_code(recorded, inputs)
     lines = [*code.lines, *(f"others[{k} * ARM_LANES + i] = {text[0]};" for k, text in enumerate(code.outputs))]
     text = part_text("held_joint").replace("@lines@", "\n        ".join(lines))
-    return text.replace("@held@", str(held.joint)).replace("@others@", str(arm.n - 1)).replace("@goal@", str(size))
+    return text.replace("@held@", str(redundant.joint)).replace("@others@", str(arm.n - 1)).replace("@goal@", str(size))
 
 
 def _array_code(name: str, values: ArrayLike) -> str:
-    flat = [c_and_js_code.number_text(float(value)) for value in np.asarray(values, dtype=float).ravel()]
-    rows = [", ".join(flat[k : k + 5]) for k in range(0, len(flat), 5)]
-    return f"static const double arm_{name}[{len(flat)}] = {{\n    " + ",\n    ".join(rows) + "};"
+    texts = [c_and_js_code.number_text(float(value)) for value in np.asarray(values, dtype=float).ravel()]
+    rows = [", ".join(texts[k : k + 5]) for k in range(0, len(texts), 5)]
+    return f"static const double arm_{name}[{len(texts)}] = {{\n    " + ",\n    ".join(rows) + "};"
 
 
 def _flags_code(name: str, values: Iterable[int]) -> str:

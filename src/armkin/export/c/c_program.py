@@ -51,7 +51,7 @@ def program(arm: Arm, file: str, task_name: str | None = None, single: bool = Fa
     actual = actual_arm(arm)  # branches and limits are in actual joint values
     method = _method_of(actual, task_name)
     task, geometry = method.task, method.geometry
-    candidates, branches = candidates_code(actual, task, geometry, single, held=method.held)
+    candidates, branches = candidates_code(actual, task, geometry, single, redundant=method.redundant)
     prefix = identifier(arm.name)
     units = ["mm" if slides else "rad" for slides in arm.prismatic]
     joints = ", ".join(f"{name} [{unit}]" for name, unit in zip(arm.joint_names, units, strict=True))
@@ -119,7 +119,7 @@ class _Method(NamedTuple):
 
     task: Task
     geometry: Geometry  # the class; with a redundant joint, the class of the others with that joint held by near
-    held: Redundancy | None  # the redundant joint
+    redundant: Redundancy | None
     numbered: bool  # whether branches have the same numbers as in Python
 
 
@@ -129,10 +129,11 @@ def _method_of(arm: Arm, task_name: str | None) -> _Method:
     if redundant is None:
         task, recognised = solver(arm, task_name)
         geometry = plain_form(arm, task, recognised)
-        return _Method(task, geometry, held=None, numbered=geometry is recognised)
+        return _Method(task, geometry, redundant=None, numbered=geometry is recognised)
     geometry = plain_form(redundant.rest, redundant.task, redundant.geometry)
-    held = redundant._replace(geometry=geometry)
-    return _Method(redundant.task, held_by_near(arm, held), held, numbered=geometry is redundant.geometry)
+    is_numbered = geometry is redundant.geometry
+    redundant = redundant._replace(geometry=geometry)
+    return _Method(redundant.task, held_by_near(arm, redundant), redundant, numbered=is_numbered)
 
 
 def candidates_code(
@@ -142,11 +143,11 @@ def candidates_code(
     single: bool = False,
     prefer: bool = True,
     lanes: str = "",
-    held: Redundancy | None = None,
+    redundant: Redundancy | None = None,
 ) -> tuple[str, int]:
     """The function `arm_candidates` for the class of an arm, and its number of branches.
 
-    lanes, held: see `c_elimination.candidates_code`; closed forms contain the held joint.
+    lanes, redundant: see `c_elimination.candidates_code`; closed forms contain the held joint.
     Raises UsageError if the class has no form in C, or none in single precision.
     """
     if geometry.pairs is not None:
@@ -158,7 +159,7 @@ def candidates_code(
         )
     if single:
         raise UsageError(f"{arm.name}: {geometry.name} needs double precision", precision="double")
-    return c_elimination.candidates_code(arm, task, geometry.elimination, lanes=lanes, held=held), MAX_ANSWERS
+    return c_elimination.candidates_code(arm, task, geometry.elimination, lanes=lanes, redundant=redundant), MAX_ANSWERS
 
 
 def settings(single: bool = False) -> str:

@@ -25,7 +25,7 @@ POSTURES = 8  # postures whose values are written
 _CLEAR = 0.02  # singular value, lengths in reaches, from which on a posture is far from singular
 
 
-def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> str:
+def golden_test(arm: Arm, task: Task, text: str, single: bool, has_names: bool) -> str:
     """The text of a test program with its values filled in; fields that the other files share stay as they are.
 
     named: branches are numbered as Python numbers them; else their numbers are not compared (-1).
@@ -42,7 +42,7 @@ def golden_test(arm: Arm, task: Task, text: str, single: bool, named: bool) -> s
         "golden_targets": _table_text(target.reshape(len(q), -1), single),
         "golden_counts": ", ".join(map(str, valid.sum(axis=1))),
         "golden_branches": _table_text(values[valid], single),
-        "golden_indices": ", ".join(str(index if named else -1) for index in branch[valid]),
+        "golden_indices": ", ".join(str(index if has_names else -1) for index in branch[valid]),
         "rows": str(valid.sum()),
         "turns": _row_text(np.where(arm.prismatic, 0.0, arm.ratio**2), single),
         "home": _row_text(arm.home, single),
@@ -89,9 +89,9 @@ def _postures(arm: Arm, task: Task, count: int) -> Array:
 def _least_singular_values(arm: Arm, task: Task, q: Array, valid: Bool) -> Array:
     """Smallest singular value (N,) of any branch's Jacobian, branches (N, B, n); 0 without branches."""
     N, B, n = q.shape
-    flat = np.nan_to_num(q).reshape(-1, n)
-    target = targets_of(task, fk(arm, flat), flat)
-    sigma = null_space(arm, task, flat, target)[0].reshape(N, B)
+    flat_q = np.nan_to_num(q).reshape(-1, n)
+    target = targets_of(task, fk(arm, flat_q), flat_q)
+    sigma = null_space(arm, task, flat_q, target)[0].reshape(N, B)
     return np.where(valid.any(axis=1), np.where(valid, sigma, np.inf).min(axis=1), 0.0)
 
 

@@ -55,8 +55,8 @@ def free_code(arm: Arm) -> str:
 
 def _quoted_name(name: str) -> str:
     """A name escaped for a C string."""
-    plain = name.encode("ascii", "replace").decode()
-    return plain.replace("\\", "\\\\").replace('"', '\\"').replace("??", "?\\?")
+    ascii_name = name.encode("ascii", "replace").decode()
+    return ascii_name.replace("\\", "\\\\").replace('"', '\\"').replace("??", "?\\?")
 
 
 def declarations(arm: Arm) -> str:

@@ -52,10 +52,10 @@ def module_text(arm: Arm, task_name: str | None = None) -> str:
     """
     if redundant := redundancy(actual_arm(arm), task_name):
         return _module_with_one_held(arm, actual_arm(arm), redundant)
-    return _module_of_all(arm, task_name, driven=not motors.undriven_joints(arm))
+    return _module_of_all(arm, task_name, has_motors=not motors.undriven_joints(arm))
 
 
-def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
+def _module_of_all(arm: Arm, task_name: str | None, has_motors: bool) -> str:
     """The text with data, kinematics, keep-outs, solver, and pulses if driven; UsageError without a form."""
     actual = actual_arm(arm)  # branches are found, and limits hold, in actual joint values
     task, recognised = solver(actual, task_name)
@@ -70,7 +70,7 @@ def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         f"// {_about_text(arm, task, geometry)}",
         part_text("head"),
         *_exported_lines(arm, task),
-        *_data_lines(arm, actual, task, geometry, branches, driven),
+        *_data_lines(arm, actual, task, geometry, branches, has_motors),
         *_kinematics(actual, task),
         *_keep_outs(arm, actual),
         _by_joint(actual, calibrated=bool((arm.ratio != 1.0).any())),
@@ -79,7 +79,7 @@ def _module_of_all(arm: Arm, task_name: str | None, driven: bool) -> str:
         solve,
         part_text("poses"),
         part_text("module").replace("@TARGET@", _target_text(task)),
-        *([part_text("pulses")] if driven else []),
+        *([part_text("pulses")] if has_motors else []),
     ]
     return "\n".join(parts)
 
@@ -89,10 +89,10 @@ def _module_with_one_held(arm: Arm, actual: Arm, redundant_joint: Redundancy) ->
     name, task = arm.joint_names[redundant_joint.joint], redundant_joint.task
     is_unchanged = actual is arm and not arm.keep_out  # then the solver is prepared already
     other_joints = redundant_joint.rest if is_unchanged else replace(lock(arm, {name: 0.0}), keep_out=(), whole=None)
-    inner = _module_of_all(other_joints, task.name, driven=False).replace(part_text("head"), "")
-    inner = re.sub("^export ", "", inner, flags=re.MULTILINE)
+    other_module = _module_of_all(other_joints, task.name, has_motors=False).replace(part_text("head"), "")
+    other_module = re.sub("^export ", "", other_module, flags=re.MULTILINE)
     link = arm.link[-1] if redundant_joint.joint else inverse(arm.link[0])
-    driven = not motors.undriven_joints(arm)
+    has_motors = not motors.undriven_joints(arm)
     redundant = {
         "joint": redundant_joint.joint,
         "before": inverse(link).ravel().tolist(),
@@ -105,14 +105,14 @@ def _module_with_one_held(arm: Arm, actual: Arm, redundant_joint: Redundancy) ->
         *_exported_lines(arm, task),
         "/** The joint that the target leaves free: `ik` holds it. */",
         f"export const redundant = {_js_text(name)};",
-        *_data_lines(arm, actual, task, redundant_joint.geometry, 0, driven),
+        *_data_lines(arm, actual, task, redundant_joint.geometry, 0, has_motors),
         f"const REDUNDANT = {_js_text(redundant)};",
-        f"const OTHERS = (() => {{\n{inner}return {{ ik, branch_names }};\n}})();",
+        f"const OTHERS = (() => {{\n{other_module}return {{ ik, branch_names }};\n}})();",
         *_kinematics(actual, task),
         *_keep_outs(arm, actual),
         part_text("poses"),
         part_text("redundant").replace("@TARGET@", _target_text(task)),
-        *([part_text("pulses")] if driven else []),
+        *([part_text("pulses")] if has_motors else []),
     ]
     return "\n".join(parts)
 
@@ -167,12 +167,12 @@ def _function_text(head: str, lines: list[str]) -> str:
     return f"{head} {{\n{body}\n}}\n"
 
 
-def _kinematics(turned: Arm, task: Task) -> list[str]:
+def _kinematics(actual: Arm, task: Task) -> list[str]:
     """The recorded functions of joint values: the tool's pose, the Jacobian, the target that is reached."""
     return [
-        _joint_function("poseOf", recording.record(lambda q: forward.tip_formula(turned, q), turned.n)),
-        _joint_function("slopeOf", recording.record(lambda q: forward.jacobian_formula(turned, q), turned.n)),
-        _joint_function("targetOf", arm_formulas.record_target(turned, task)),
+        _joint_function("poseOf", recording.record(lambda q: forward.tip_formula(actual, q), actual.n)),
+        _joint_function("slopeOf", recording.record(lambda q: forward.jacobian_formula(actual, q), actual.n)),
+        _joint_function("targetOf", arm_formulas.record_target(actual, task)),
     ]
 
 
@@ -192,21 +192,21 @@ def _exported_lines(arm: Arm, task: Task) -> list[str]:
     ]
 
 
-def _data_lines(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches: int, driven: bool) -> list[str]:
+def _data_lines(arm: Arm, actual: Arm, task: Task, geometry: Geometry, branches: int, has_motors: bool) -> list[str]:
     """The data of the arm that the parts read."""
     fields: dict[str, Any] = {
         "name": arm.name,
         "joints": arm.n,
         "branches": branches,
-        "names": branch_names(turned, task, geometry, branches) if branches else [],
+        "names": branch_names(actual, task, geometry, branches) if branches else [],
         "method": geometry.name,
-        "slides": turned.prismatic.tolist(),
-        "lower": turned.lower.tolist(),
-        "upper": turned.upper.tolist(),
-        "home": turned.home.tolist(),
+        "slides": actual.prismatic.tolist(),
+        "lower": actual.lower.tolist(),
+        "upper": actual.upper.tolist(),
+        "home": actual.home.tolist(),
         "ratio": arm.ratio.tolist(),
-        "unit": radian_or_reach(turned).tolist(),
-        "reach": turned.reach,
+        "unit": radian_or_reach(actual).tolist(),
+        "reach": actual.reach,
         "position": task.position,
         "sums": task.sums.tolist(),
         "offsets": task.offsets.tolist(),
@@ -217,7 +217,7 @@ def _data_lines(arm: Arm, turned: Arm, task: Task, geometry: Geometry, branches:
     code = [_ARM_IS, "const ARM = {", *lines, "};", f"const ROTATION = {_ROUNDED!r};"]
     code.append(f"const CLOSED_FORM = {_js_text(geometry.pairs is not None)};")
     code.append(f"const CALIBRATED = {_js_text(bool((arm.ratio != 1.0).any()))};")
-    if driven:
+    if has_motors:
         values = {
             "gain": arm.motor_gain.tolist(),
             "bias": arm.motor_bias.tolist(),
@@ -263,19 +263,19 @@ def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
     if low > -np.pi + _ONE_COPY and high < np.pi - _ONE_COPY:  # only one copy is legal, whatever `near` is
         nearest = ["if (!(Math.abs(value) < Math.PI - SLACK)) {", copy, "}", *check]
     else:
-        usual = " && ".join([f"Math.abs(value - near[{j}]) < Math.PI - SLACK", *tests])
-        nearest = [f"if (!({usual})) {{", copy, *(f"  {line}" for line in check), "}"]
+        keeps_value = " && ".join([f"Math.abs(value - near[{j}]) < Math.PI - SLACK", *tests])
+        nearest = [f"if (!({keeps_value})) {{", copy, *(f"  {line}" for line in check), "}"]
     return [f"value = q[{j}];", *nearest, f"turned += {change};"]
 
 
-def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
+def _keep_outs(arm: Arm, actual: Arm) -> list[str]:
     """The tables of keep-outs, and the function of clearances; empty ones without keep-outs."""
     if not arm.keep_out:
         return ["const KEEPS_OUT = false;", "/** @type {(q: Numbers) => any} */", "const hitsOf = () => ({});"]
-    held = pair_tables(turned)
+    tables = pair_tables(actual)
     values = {
-        **held._asdict(),
-        "shapes": [{"kind": kind, "numbers": numbers} for kind, numbers in held.shapes],
+        **tables._asdict(),
+        "shapes": [{"kind": kind, "numbers": numbers} for kind, numbers in tables.shapes],
         "clearance": arm.clearance,
     }
     return [
@@ -284,7 +284,7 @@ def _keep_outs(arm: Arm, turned: Arm) -> list[str]:
         "const KEEP_OUT = {",
         *(f"  {name}: {_js_text(value)}," for name, value in values.items()),
         "};",
-        _joint_function("endsOf", recording.record(lambda q: ends_formula(turned, q), arm.n)),
+        _joint_function("endsOf", recording.record(lambda q: ends_formula(actual, q), arm.n)),
         part_text("keep_out"),
     ]
 

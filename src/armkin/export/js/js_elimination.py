@@ -88,8 +88,8 @@ def _pencil_code(pencil: Pencil) -> str:
 
 
 def _array_code(values: ArrayLike) -> str:
-    flat = np.asarray(values, dtype=float).ravel().tolist()
-    return f"Float64Array.of({', '.join(str(int(value)) if value == int(value) else repr(value) for value in flat)})"
+    numbers = np.asarray(values, dtype=float).ravel().tolist()
+    return f"Float64Array.of({', '.join(str(int(value)) if value == int(value) else repr(value) for value in numbers)})"
 
 
 def _arrays_code(rows: list[np.ndarray]) -> str:

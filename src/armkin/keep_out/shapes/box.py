@@ -78,17 +78,17 @@ def read_box(entry: Entry) -> Box:
     return Box((low + high) / 2, np.eye(3), (high - low) / 2)
 
 
-def _outer_distance(start: Array, direction: Array, half: Array) -> Array:
+def _outer_distance(start: Array, direction: Array, half_sizes: Array) -> Array:
     """Least squared distance of segments from `start` along `direction` (3, M) to the box: (M,), 0 inside."""
-    half_size = half[:, None]
+    half_column = half_sizes[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         # (6, M) parameters where the segment crosses the planes of the faces
-        crossings = np.concatenate([(half_size - start) / direction, (-half_size - start) / direction])
+        crossings = np.concatenate([(half_column - start) / direction, (-half_column - start) / direction])
     np.clip(np.nan_to_num(crossings, copy=False, nan=0.0, posinf=1.0, neginf=0.0), 0.0, 1.0, out=crossings)
     low, high = np.zeros(start.shape[1]), np.ones(start.shape[1])
-    slope_low, slope_high = (_half_slope(t, start, direction, half_size) for t in (low, high))
+    slope_low, slope_high = (_half_slope(t, start, direction, half_column) for t in (low, high))
     for t in crossings:
-        slope = _half_slope(t, start, direction, half_size)
+        slope = _half_slope(t, start, direction, half_column)
         is_closer = (slope <= 0.0) & (t > low)
         low, slope_low = np.where(is_closer, t, low), np.where(is_closer, slope, slope_low)
         is_closer = (slope >= 0.0) & (t < high)
@@ -97,7 +97,7 @@ def _outer_distance(start: Array, direction: Array, half: Array) -> Array:
     share = np.divide(-slope_low, rise, out=np.zeros_like(rise), where=(rise > 0.0) & (slope_low < 0.0))
     t = low + np.minimum(share, 1.0) * (high - low)
     t = np.where(slope_high <= 0.0, high, np.where(slope_low >= 0.0, low, t))
-    excess = np.maximum(np.abs(start + t * direction) - half_size, 0.0)
+    excess = np.maximum(np.abs(start + t * direction) - half_column, 0.0)
     square: Array = np.einsum("km,km->m", excess, excess)
     return square
 
@@ -109,10 +109,10 @@ def _half_slope(t: Array, start: Array, direction: Array, half_size: Array) -> A
     return slope
 
 
-def _inner_distance(start: Array, direction: Array, half: Array) -> Array:
+def _inner_distance(start: Array, direction: Array, half_sizes: Array) -> Array:
     """Least signed distance of segments that touch the box: (M,), at most 0."""
     signs = np.array([1.0, 1.0, 1.0, -1.0, -1.0, -1.0])[:, None]
-    height, slope = signs * np.tile(start, (2, 1)) - np.tile(half, 2)[:, None], signs * np.tile(direction, (2, 1))
+    height, slope = signs * np.tile(start, (2, 1)) - np.tile(half_sizes, 2)[:, None], signs * np.tile(direction, (2, 1))
     first, second = np.triu_indices(6, 1)
     with np.errstate(divide="ignore", invalid="ignore"):
         meets = (height[second] - height[first]) / (slope[first] - slope[second])

@@ -39,7 +39,7 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     The entry `self`, for hits between bodies, goes with the arm, even if a scene contains it.
     """
     count = len(arm.keep_out) - arm.of_scene
-    own, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
+    own_entries, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
     clearance, sha256 = arm.clearance, arm.scene_sha256
     if scene is not None:
         added = read_scene(os.fspath(scene))
@@ -47,10 +47,10 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     if not obstacles:
         return arm, Obstacles()
     self_entries = tuple(entry for entry in obstacles if entry.kind == "self")
-    if not any(entry.kind == "self" for entry in own):
-        own += self_entries[:1]
+    if not any(entry.kind == "self" for entry in own_entries):
+        own_entries += self_entries[:1]
     fixed = tuple(entry for entry in obstacles if entry.kind != "self")
-    return replace(arm, keep_out=own, clearance=clearance, of_scene=0), Obstacles(fixed, clearance, sha256)
+    return replace(arm, keep_out=own_entries, clearance=clearance, of_scene=0), Obstacles(fixed, clearance, sha256)
 
 
 def free_at_place(

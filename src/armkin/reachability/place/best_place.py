@@ -13,25 +13,25 @@ from armkin.reachability.place.reached_targets import PlaceQuestion, at_value, f
 Room = Callable[[int, int, int], float]  # index of a place -> distance of its joints to limits, as a share of the range
 
 
-def margins(good: NDArray[np.bool_], step: float) -> Array:
+def margins(is_good: NDArray[np.bool_], step: float) -> Array:
     """Distance of each good place (X, Y, K) to the nearest place of the same yaw that is not good; else 0."""
-    X, _, K = good.shape
-    distances = np.zeros(good.shape)
+    X, _, K = is_good.shape
+    distances = np.zeros(is_good.shape)
     columns = np.arange(X)[:, None]
     for yaw in range(K):
-        if not good[:, :, yaw].any():
+        if not is_good[:, :, yaw].any():
             continue
         # distance transform, first along y, then along x, where each row gives a parabola
-        rows = _depth_along_y(good[:, :, yaw])
+        rows = _depth_along_y(is_good[:, :, yaw])
         distances[:, :, yaw] = np.sqrt(np.min((columns - columns.T)[:, :, None] ** 2 + rows[None] ** 2, axis=1)) * step
     return distances
 
 
-def _depth_along_y(good: NDArray[np.bool_]) -> Array:
+def _depth_along_y(is_good: NDArray[np.bool_]) -> Array:
     """Number of steps along y to the nearest place that is not good: (X, Y)."""
-    index = np.where(good, np.inf, np.arange(good.shape[1]))
-    steps_up = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(good.shape[1])
-    steps_down = np.arange(good.shape[1]) - np.maximum.accumulate(np.where(good, -np.inf, index), axis=1)
+    index = np.where(is_good, np.inf, np.arange(is_good.shape[1]))
+    steps_up = np.minimum.accumulate(index[:, ::-1], axis=1)[:, ::-1] - np.arange(is_good.shape[1])
+    steps_down = np.arange(is_good.shape[1]) - np.maximum.accumulate(np.where(is_good, -np.inf, index), axis=1)
     return np.asarray(np.minimum(steps_up, steps_down))
 
 

@@ -239,18 +239,18 @@ def _chunks(questions: Sequence[PlaceQuestion], grids: Sequence[tuple[Array, Arr
 def _place_result(
     question: PlaceQuestion,
     axes: tuple[Array, Array],
-    inner: tuple[slice, slice],
+    area_slices: tuple[slice, slice],
     counts: NDArray[np.int64],
     settings: dict[str, Any],
     file: PathFile | None,
 ) -> Place:
-    """The result of one arm; counts: (places,) reached targets on the grid, whose part `inner` is the area."""
+    """The result of one arm; counts: (places,) reached targets on the grid, whose part `area_slices` is the area."""
     grid_counts = counts.reshape(len(axes[0]), len(axes[1]), question.yaws)
-    reached = grid_counts[inner]
-    margin = margins(grid_counts == len(question.targets), settings["step"])[inner]
-    x, y, yaws = axes[0][inner[0]], axes[1][inner[1]], np.arange(question.yaws) * settings["yaw"]
+    reached = grid_counts[area_slices]
+    margin = margins(grid_counts == len(question.targets), settings["step"])[area_slices]
+    x, y, yaws = axes[0][area_slices[0]], axes[1][area_slices[1]], np.arange(question.yaws) * settings["yaw"]
     room = limit_rooms(question, x, y, yaws)
-    best = best_place(room, reached, margin)
+    best_index = best_place(room, reached, margin)
     goals, no_postures = positions_of(question.task, question.targets), np.zeros((0, question.arm.n))
     place = Place(
         arm=question.arm,
@@ -261,7 +261,7 @@ def _place_result(
         reached=reached,
         margin=margin,
         of=len(question.targets),
-        best=best,
+        best=best_index,
         positions=goals,
         postures=no_postures,
     )
@@ -288,32 +288,34 @@ def _plan_best_places(question: PlaceQuestion, place: Place, file: PathFile, roo
     """The place with plans from its best places; a place without a plan does not reach all targets."""
     if reason := path_from_place.missing_rates_text(question.arm):
         return replace(place, unplanned=reason)
-    tried: list[PathFromPlace] = []
-    untried = place.reached.copy()
-    while untried.max() == place.of and len(tried) < TRIES and sum(path.plan is not None for path in tried) < PLANS:
-        i, j, k = best_place(room, untried, place.margin)
+    paths: list[PathFromPlace] = []
+    untried_counts = place.reached.copy()
+    while (
+        untried_counts.max() == place.of and len(paths) < TRIES and sum(path.plan is not None for path in paths) < PLANS
+    ):
+        i, j, k = best_place(room, untried_counts, place.margin)
         xyz, yaw = (float(place.x[i]), float(place.y[j]), place.z), float(place.yaw[k])
-        tried.append(path_from_place.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
-        untried[i, j, k] = -1
-        if tried[-1].plan is None:
+        paths.append(path_from_place.plan_from_place(question.arm, question.obstacles, (i, j, k), xyz, yaw, file))
+        untried_counts[i, j, k] = -1
+        if paths[-1].plan is None:
             place.reached[i, j, k], place.margin[i, j, k] = place.of - 1, 0.0
-    best = next((path.index for path in tried if path.plan is not None), None)
-    if best is None:
-        best = best_place(room, place.reached, place.margin)
-    return replace(place, best=best, planned=tuple(tried))
+    best_index = next((path.index for path in paths if path.plan is not None), None)
+    if best_index is None:
+        best_index = best_place(room, place.reached, place.margin)
+    return replace(place, best=best_index, planned=tuple(paths))
 
 
 def _question(
     arm: Arm, targets: Any, file: PathFile | None, settings: dict[str, Any], scene: str | os.PathLike[str] | None
 ) -> PlaceQuestion:
     """The question for one arm, with its own keep-outs separated from those of a scene."""
-    ways: tuple[int, ...] = ()
+    path_lengths: tuple[int, ...] = ()
     redundant_joint, held_values = "", tuple[float, ...]()
     if file is None:
         task = task_for(arm, None)
     else:
         task, routes = path_from_place.ways_of_path(arm, file)
-        targets, ways = np.concatenate(routes), tuple(map(len, routes))
+        targets, path_lengths = np.concatenate(routes), tuple(map(len, routes))
         redundant_joint, held_values = path_from_place.joint_to_hold(arm, file)
     arm, obstacles = split_keep_outs(arm, scene)
     yaws = math.ceil(TURN / settings["yaw"] - STRAIGHT)
@@ -326,7 +328,7 @@ def _question(
         step=settings["yaw"],
         z=settings["z"],
         obstacles=obstacles,
-        ways=ways,
+        ways=path_lengths,
         spare=redundant_joint,
         values=held_values,
     )
@@ -360,7 +362,7 @@ def _axes(
         area = [lowest[0], highest[0], lowest[1], highest[1]]
     if len(area) != 4 or not np.isfinite(area).all() or area[1] < area[0] or area[3] < area[2]:
         raise UsageError("area: XMIN,XMAX,YMIN,YMAX in mm, each from the lower to the upper end")
-    axes, inner = [], []
+    axes, area_slices = [], []
     for axis, (start, end) in enumerate(((area[0], area[1]), (area[2], area[3]))):
         last = math.floor((end - start) / step + 1e-9)
         count_below = max(math.ceil((start - low[axis]) / step), 0) + 1
@@ -368,8 +370,8 @@ def _axes(
         if (last + count_below + count_above + 1) ** 2 * question.yaws > 4 * MAX_PLACES:
             raise UsageError(f"more than {MAX_PLACES:,} places: take a larger step or a smaller area", most=MAX_PLACES)
         axes.append(start + np.arange(-count_below, last + count_above + 1) * step)
-        inner.append(slice(count_below, count_below + last + 1))
-    return (axes[0], axes[1]), (inner[0], inner[1])
+        area_slices.append(slice(count_below, count_below + last + 1))
+    return (axes[0], axes[1]), (area_slices[0], area_slices[1])
 
 
 def _position_blocks(question: PlaceQuestion, positions: Array) -> Iterator[Array]:

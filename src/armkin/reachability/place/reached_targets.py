@@ -107,12 +107,14 @@ def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.in
     blocked = question.arm.keep_out or question.obstacles.keep_out
     unobstructed = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
     pending = np.arange(len(positions))
-    for held, free_question in zip(each_value(question), each_value(unobstructed), strict=True):
-        to_ask, counted = pending, reached_counts(free_question, positions[pending])
+    for value_question, free_question in zip(each_value(question), each_value(unobstructed), strict=True):
+        to_ask, free_counts = pending, reached_counts(free_question, positions[pending])
         if blocked:
-            to_ask = pending[(counted > counts[pending]).any(axis=1)]
+            to_ask = pending[(free_counts > counts[pending]).any(axis=1)]
         if len(to_ask):
-            counts[to_ask] = np.maximum(counts[to_ask], reached_counts(held, positions[to_ask]) if blocked else counted)
+            counts[to_ask] = np.maximum(
+                counts[to_ask], reached_counts(value_question, positions[to_ask]) if blocked else free_counts
+            )
         pending = pending[(counts[pending] < len(question.targets)).any(axis=1)]
         if not len(pending):
             break
@@ -133,13 +135,13 @@ def at_value(question: PlaceQuestion, position: Array, yaw: float) -> PlaceQuest
     """The question with the redundant joint held at the first value that reaches most targets from one place."""
     if not question.values:
         return question
-    yaw_index, greatest, best = round(yaw / question.step), -1, question
+    yaw_index, greatest, best_question = round(yaw / question.step), -1, question
     for candidate in each_value(question):
         if (count := int(reached_counts(candidate, position[None])[0, yaw_index])) > greatest:
-            greatest, best = count, candidate
+            greatest, best_question = count, candidate
         if greatest == len(question.targets):
             break
-    return best
+    return best_question
 
 
 @lru_cache(maxsize=4)
@@ -162,11 +164,11 @@ def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.
     for length in question.ways:
         part = slice(begin, begin + length)
         count = legal[:, part].sum(axis=1, dtype=np.int64)
-        carried = count == length
-        for place in np.flatnonzero(carried.any(axis=1)) if length > 1 else ():
+        has_all = count == length
+        for place in np.flatnonzero(has_all.any(axis=1)) if length > 1 else ():
             question_of_path = question._replace(targets=question.targets[part])
-            carried[place] = _on_one_branch(question_of_path, positions[place], carried[place])
-        counts += np.where(carried, length, np.minimum(count, length - 1))
+            has_all[place] = _on_one_branch(question_of_path, positions[place], has_all[place])
+        counts += np.where(has_all, length, np.minimum(count, length - 1))
         begin += length
     return counts
 
@@ -216,15 +218,15 @@ def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) ->
     legal = np.zeros((len(target), question.yaws), bool)
     in_reach = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
     goals = _shift_targets(question._replace(targets=question.targets[target[in_reach]]), place[in_reach])
-    unsolved = np.arange(len(in_reach))
+    rest_rows = np.arange(len(in_reach))
     if (blocks := columns(question.arm, goals, question.task.name)) is not None:
-        edges = [unsolved[:0]]
+        edges = [rest_rows[:0]]
         for block in blocks:
             legal[in_reach[block.rows]] = _legal_turns(question, block.values, block.valid)
             edges.append(block.rows.start + block.left)
-        unsolved = np.concatenate(edges)
-    if len(unsolved):
-        solutions, rows = question.solve(question.arm, goals[unsolved], question.task.name), in_reach[unsolved]
+        rest_rows = np.concatenate(edges)
+    if len(rest_rows):
+        solutions, rows = question.solve(question.arm, goals[rest_rows], question.task.name), in_reach[rest_rows]
         legal[rows] = _legal_turns(question, list(solutions.q.transpose(2, 1, 0)), solutions.valid.T)
         edge = rows[(solutions.status == Status.BOUNDARY) | (solutions.status == Status.SINGULAR)]
         legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
@@ -260,19 +262,19 @@ def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array)
 
 def _any_legal(question: PlaceQuestion, goals: Array) -> NDArray[np.bool_]:
     """Which targets, in the arm's frame, are reached by a branch within limits: (N,)."""
-    arm, legal, unsolved = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
+    arm, legal, rest_rows = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
     isolated_answers = arm.n == question.task.constraints
     if isolated_answers and (blocks := columns(arm, goals, question.task.name)) is not None:
-        edges = [unsolved[:0]]
+        edges = [rest_rows[:0]]
         for block in blocks:
             is_legal = block.valid
             for j in range(arm.n):
                 is_legal = is_legal & some_copy_legal(arm, block.values[j], j)
             legal[block.rows] = is_legal.any(axis=0)
             edges.append(block.rows.start + block.left)
-        unsolved = np.concatenate(edges)
-    if len(unsolved):
-        legal[unsolved] = question.solve(arm, goals[unsolved], question.task.name).within_limits.any(axis=1)
+        rest_rows = np.concatenate(edges)
+    if len(rest_rows):
+        legal[rest_rows] = question.solve(arm, goals[rest_rows], question.task.name).within_limits.any(axis=1)
     return legal
 
 
@@ -306,8 +308,8 @@ def _prefix_bits(count: int) -> NDArray[np.uint64]:
 
     A place passed twice has bit 0 again, so that an arc is the exclusive or of the prefixes of its two ends.
     """
-    once = pack_bits(np.arange(count) < np.arange(count + 1)[:, None])
-    return np.concatenate([once, once[-1] ^ once[1:]])
+    prefixes = pack_bits(np.arange(count) < np.arange(count + 1)[:, None])
+    return np.concatenate([prefixes, prefixes[-1] ^ prefixes[1:]])
 
 
 def _on_one_branch(question: PlaceQuestion, position: Array, yaws: NDArray[np.bool_]) -> NDArray[np.bool_]:

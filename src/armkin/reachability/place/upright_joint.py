@@ -104,14 +104,14 @@ def _answers_from_feet(arm: Arm, branches: Radii, target: Array, feet: Feet) -> 
     angle *= 1.0 if arm.link[0][2, 2] > 0 else -1.0
     angle -= _range_middle(arm, 0)
     is_reached, is_possible = np.zeros(len(in_reach), bool), np.zeros(len(in_reach), bool)
-    for first, sure, greatest in zip(branches.first, branches.sure, branches.open, strict=True):
+    for first, sure_distance, greatest in zip(branches.first, branches.sure, branches.open, strict=True):
         if (greatest < 0.0).all():
             continue
         offset = first.take(cell)
         offset += angle
         offset -= TURN * np.rint(offset * (1.0 / TURN))
         offset = np.abs(offset, out=offset)
-        is_reached |= offset <= sure.take(cell)
+        is_reached |= offset <= sure_distance.take(cell)
         is_possible |= offset <= greatest.take(cell)
     return Answers(in_reach, is_reached, is_possible & ~is_reached)
 
@@ -129,8 +129,8 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     values = [np.concatenate([part.values[j] for part in parts], axis=1).reshape(-1, T, count) for j in range(arm.n)]
     miss = np.concatenate([part.miss for part in parts], axis=1).reshape(-1, T, count)
     valid = np.concatenate([part.valid for part in parts], axis=1).reshape(-1, T, count)
-    unsolved = np.zeros(T * count, bool)
-    unsolved[np.concatenate([part.rows.start + part.left for part in parts])] = True
+    is_unsolved = np.zeros(T * count, bool)
+    is_unsolved[np.concatenate([part.rows.start + part.left for part in parts])] = True
     # nan, of a branch far from its target, is neither sure nor excluded, so that such cells are solved
     gap = np.sqrt(miss)
     is_excluded = _lesser_end(gap) > _cell_motion(gap) + spacing / arm.reach
@@ -138,19 +138,19 @@ def _radii(arm: Arm, task: str, targets: Array) -> Radii | None:
     for j in range(1, arm.n):
         if not arm.prismatic[j] and whole_turn(arm, j):
             continue
-        room, moved = (_limit_distance(arm, values[j], j), _cell_motion(values[j], not arm.prismatic[j]))
-        is_sure &= _lesser_end(room) > moved
-        is_excluded |= _lesser_end(-room) > moved
-    is_doubted = unsolved.reshape(T, count)
+        room, cell_motion = (_limit_distance(arm, values[j], j), _cell_motion(values[j], not arm.prismatic[j]))
+        is_sure &= _lesser_end(room) > cell_motion
+        is_excluded |= _lesser_end(-room) > cell_motion
+    is_doubted = is_unsolved.reshape(T, count)
     is_doubted = is_doubted[:, :-1] | is_doubted[:, 1:]
     is_sure, is_excluded = is_sure & ~is_doubted, is_excluded & ~is_doubted
-    half_range, moved = _half_range(arm, 0), _cell_motion(values[0], True)
+    half_range, cell_motion = _half_range(arm, 0), _cell_motion(values[0], True)
     axes = (1, 0, 2)
     return Radii(
         spacing,
         values[0][..., :-1].transpose(axes),
-        np.where(is_sure, half_range - moved, -1.0).transpose(axes),
-        np.where(is_excluded, -1.0, np.where(np.isnan(moved), np.inf, half_range + moved)).transpose(axes),
+        np.where(is_sure, half_range - cell_motion, -1.0).transpose(axes),
+        np.where(is_excluded, -1.0, np.where(np.isnan(cell_motion), np.inf, half_range + cell_motion)).transpose(axes),
     )
 
 
