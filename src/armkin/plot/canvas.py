@@ -127,8 +127,8 @@ def space_axes(figure: Any, place: Sequence[float], view: tuple[float, float]) -
 def _lengths_on_paper(elevation: float, azimuth: float) -> Array:
     """How long x, y and z of length 1 look from an eye far away at these angles [deg]."""
     up, around = np.radians(elevation), np.radians(azimuth)
-    toward = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
-    lengths: Array = np.sqrt(np.maximum(1.0 - toward**2, 0.0))
+    view_direction = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
+    lengths: Array = np.sqrt(np.maximum(1.0 - view_direction**2, 0.0))
     return lengths
 
 
@@ -142,14 +142,14 @@ def true_proportions(axes: Any, points: Array, floor: float, ticks: float = 7.5)
     low, high = points.min(axis=0), points.max(axis=0)
     low[2] = min(low[2], floor)
     size = high - low
-    most = float(size.max()) or 1.0
+    largest = float(size.max()) or 1.0
     # No side is so short that its ticks would run into each other.
-    grow = np.maximum(0.5 * (0.5 * most - size), 0.0) + 0.04 * most
+    grow = np.maximum(0.5 * (0.5 * largest - size), 0.0) + 0.04 * largest
     if low[2] == floor:  # the arm stands on the floor
         low, high = low - grow * [1, 1, 0], high + grow * [1, 1, 2]
     else:
         low, high = low - grow, high + grow
-    step = tick_step(most, ticks)
+    step = tick_step(largest, ticks)
     for name, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{name}lim")(a, b)
         # Where two axes meet, the last tick of one would lie on the first of the other.
@@ -174,10 +174,10 @@ def _fill_place(axes: Any, size: Array) -> None:
     zoom, fits = 1.0, axes.figure.transFigure.inverted()
     for _ in range(5):  # the labels do not grow with the box, and perspective is only nearly proportional
         axes.set_box_aspect(size, zoom=zoom)
-        least, greatest = fits.transform(_visible_corners(axes))
-        zoom *= float((room / (greatest - least)).min())
+        lowest, highest = fits.transform(_visible_corners(axes))
+        zoom *= float((room / (highest - lowest)).min())
         place = axes.get_position(original=True)
-        shift = middle - 0.5 * (least + greatest)
+        shift = middle - 0.5 * (lowest + highest)
         axes.set_position([place.x0 + shift[0], place.y0 + shift[1], place.width, place.height])
 
 
@@ -190,21 +190,21 @@ def _visible_corners(axes: Any) -> Array:
     boxes = [axis.get_tightbbox(drawer) for axis in (axes.xaxis, axes.yaxis, axes.zaxis)]
     ends = np.array([axes.get_xlim(), axes.get_ylim(), axes.get_zlim()])
     corners = np.array([[x, y, z] for x in ends[0] for y in ends[1] for z in ends[2]])
-    across, up, _ = import_module("mpl_toolkits.mplot3d.proj3d").proj_transform(*corners.T, axes.M)
-    points = [axes.transData.transform(np.column_stack([across, up]))]
+    x_on_paper, y_on_paper, _ = import_module("mpl_toolkits.mplot3d.proj3d").proj_transform(*corners.T, axes.M)
+    points = [axes.transData.transform(np.column_stack([x_on_paper, y_on_paper]))]
     points += [box.get_points() for box in boxes if box is not None and np.isfinite(box.get_points()).all()]
     pixels = np.concatenate(points)
     return np.array([pixels.min(axis=0), pixels.max(axis=0)])
 
 
-def tick_step(size: float, most: float = 7.5) -> float:
+def tick_step(size: float, max_ticks: float = 7.5) -> float:
     """The smallest round distance [mm] between ticks that a size [mm] holds at most so often.
 
     >>> tick_step(400.0), tick_step(1400.0)
     (100.0, 200.0)
     """
-    power = 10.0 ** np.floor(np.log10(size / most))
-    return float(power * next(factor for factor in (1, 2, 5, 10) if factor * power >= size / most))
+    power = 10.0 ** np.floor(np.log10(size / max_ticks))
+    return float(power * next(factor for factor in (1, 2, 5, 10) if factor * power >= size / max_ticks))
 
 
 def flat_axes(figure: Any, place: Sequence[float], labels: tuple[str, str], shrink: bool = False) -> Any:

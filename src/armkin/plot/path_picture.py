@@ -40,21 +40,23 @@ def plot_path(plan: PathPlan, out: str) -> None:
         _draw_in_space(plan, figure, q)
         rows = [figure.add_axes((0.60, bottom, 0.37, 0.185)) for bottom in (0.735, 0.51, 0.285, 0.06)]
         _draw_joints(plan, rows[0], t, q)
-        fine = _fine_times(plan, t)
-        _draw_shares(plan, rows[1], t, _peaks(t, fine, np.abs(plan.qd(fine)) / plan.arm.max_speed), "speed / max")
-        _draw_shares(plan, rows[2], t, _peaks(t, fine, np.abs(plan.qdd(fine)) / plan.arm.max_accel), "accel. / max")
-        _draw_tool_speed(rows[3], t, fine, position(plan.arm, plan.q(fine)))
+        fine_times = _fine_times(plan, t)
+        speed_shares = np.abs(plan.qd(fine_times)) / plan.arm.max_speed
+        accel_shares = np.abs(plan.qdd(fine_times)) / plan.arm.max_accel
+        _draw_shares(plan, rows[1], t, _peaks(t, fine_times, speed_shares), "speed / max")
+        _draw_shares(plan, rows[2], t, _peaks(t, fine_times, accel_shares), "accel. / max")
+        _draw_tool_speed(rows[3], t, fine_times, position(plan.arm, plan.q(fine_times)))
         for axes in rows[:-1]:
             axes.set_xticklabels([])
         rows[-1].set_xlabel("time / s", labelpad=2, fontsize=8)
-        straight = [(_time_of(plan, singularity.begin), _time_of(plan, singularity.end)) for singularity in plan.passed]
+        passes = [(_time_of(plan, singularity.begin), _time_of(plan, singularity.end)) for singularity in plan.passed]
         for axes in rows:
             axes.set_xlim(0.0, max(plan.duration, 1e-9))
             axes.grid(True, linewidth=0.4)
             axes.tick_params(labelsize=8)
-            for when in _break_times(plan):
-                axes.axvline(when, color=_SINGULAR_COLOUR, linewidth=0.8, linestyle="--")
-            for begin, end in straight:
+            for time in _break_times(plan):
+                axes.axvline(time, color=_SINGULAR_COLOUR, linewidth=0.8, linestyle="--")
+            for begin, end in passes:
                 axes.axvspan(begin, end, color=_STRAIGHT_COLOUR, linewidth=0)
 
 
@@ -62,11 +64,11 @@ def _wrist_pass_lines(plan: PathPlan) -> list[str]:
     """How the wrist passes singularities: the first in words, the others in number."""
     if not plan.passed:
         return []
-    first, more = plan.passed[0], len(plan.passed) - 1
-    turned = f"tool turned by {first.turned / units.DEGREE:.2g} deg"
-    how = turned if first.turned else f"tip {first.aside:.2g} mm aside"
+    first, rest_count = plan.passed[0], len(plan.passed) - 1
+    turn_text = f"tool turned by {first.turned / units.DEGREE:.2g} deg"
+    deviation_text = turn_text if first.turned else f"tip {first.aside:.2g} mm aside"
     place = f"straight through a wrist singularity, {first.begin:.0f} to {first.end:.0f} mm"
-    return [f"{place}: {how}{f'; {more} more' if more else ''}"]
+    return [f"{place}: {deviation_text}{f'; {rest_count} more' if rest_count else ''}"]
 
 
 def _fine_times(plan: PathPlan, t: Array) -> Array:
@@ -75,16 +77,16 @@ def _fine_times(plan: PathPlan, t: Array) -> Array:
     return np.linspace(0.0, plan.duration, (len(t) - 1) * parts + 1)
 
 
-def _peaks(t: Array, fine: Array, values: Array) -> Array:
+def _peaks(t: Array, fine_times: Array, values: Array) -> Array:
     """The greatest of what falls about each of the times t (T,): (F, n) -> (T, n)."""
     greatest = np.zeros((len(t), values.shape[1]))
-    np.maximum.at(greatest, np.rint(fine / max(t[-1], 1e-300) * (len(t) - 1)).astype(int), values)
+    np.maximum.at(greatest, np.rint(fine_times / max(t[-1], 1e-300) * (len(t) - 1)).astype(int), values)
     return greatest
 
 
 def _title(plan: PathPlan) -> str:
-    before = "" if plan.approach is None else f", {plan.approach.duration:.2f} s to its start before"
-    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s{before}"
+    approach_text = "" if plan.approach is None else f", {plan.approach.duration:.2f} s to its start before"
+    return f"{plan.arm.name}: {plan.length:.1f} mm of path in {plan.duration:.2f} s{approach_text}"
 
 
 def _branch_names(plan: PathPlan) -> str:
@@ -99,8 +101,8 @@ def _break_times(plan: PathPlan) -> list[float]:
     begins = plan.motion.begins
     times = []
     for reconfiguration in plan.reconfigurations:
-        later = [begins[k] for k in sorted(plan.on_path) if plan.s_range(k)[0] >= reconfiguration.s - 1e-6]
-        times += later[:1]
+        begins_after = [begins[k] for k in sorted(plan.on_path) if plan.s_range(k)[0] >= reconfiguration.s - 1e-6]
+        times += begins_after[:1]
     return times
 
 
@@ -112,19 +114,19 @@ def _draw_in_space(plan: PathPlan, figure: Any, q: Array) -> None:
     points = np.concatenate([position(arm, q), arm.base[None, :3, 3], *(bone.path for bone in bones)])
     reach = np.abs(points[:, :2] - arm.base[:2, 3]).max(axis=0)
     size = float((points.max(axis=0) - points.min(axis=0)).max())
-    way = _tool_way(plan)
-    small = float((np.nanmax(way, axis=0) - np.nanmin(way, axis=0)).max()) if len(way) else size
-    large = small >= _SMALL_WAY * size
-    way = _thin_out(way, _POINT_SIZE * (size if large else small))
-    low, high = (0.03, 0.76) if large else (0.37, 0.44)
+    tool_path = _tool_way(plan)
+    path_size = float((np.nanmax(tool_path, axis=0) - np.nanmin(tool_path, axis=0)).max()) if len(tool_path) else size
+    is_large = path_size >= _SMALL_WAY * size
+    tool_path = _thin_out(tool_path, _POINT_SIZE * (size if is_large else path_size))
+    low, high = (0.03, 0.76) if is_large else (0.37, 0.44)
     axes = space_axes(figure, (0.0, low, 0.53, high), (22.0, -60.0 if reach[0] >= reach[1] else -30.0))
     for pose, bone in zip(poses, bones, strict=True):
         look = {"color": pose.colour, "linewidth": pose.width, "linestyle": pose.dashes}
         axes.plot(*bone.path.T, **look, label=pose.label, solid_capstyle="round")
         axes.plot(*bone.joints.T, color=pose.colour, marker="o", markersize=4, linestyle="none")
-    if not large:
-        _draw_from_near(plan, figure, way)
-    axes.plot(*(way if len(way) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
+    if not is_large:
+        _draw_from_near(plan, figure, tool_path)
+    axes.plot(*(tool_path if len(tool_path) else position(arm, q)).T, color=_INK, linewidth=1.2, label="tool")
     for reconfiguration in plan.reconfigurations:
         tip = position(arm, plan.q(_time_of(plan, reconfiguration.s))[None])
         axes.plot(*tip.T, color=_SINGULAR_COLOUR, marker="x", markersize=8, linestyle="none")
@@ -177,13 +179,13 @@ def _tool_way(plan: PathPlan) -> Array:
     return np.concatenate(parts) if parts else np.zeros((0, 3))
 
 
-def _thin_out(way: Array, close: float) -> Array:
+def _thin_out(points: Array, distance: float) -> Array:
     """A way (N, 3) of very many points without those that lie in the same small box as the one before."""
-    if len(way) <= _MANY_POINTS:
-        return way
+    if len(points) <= _MANY_POINTS:
+        return points
     with np.errstate(invalid="ignore"):
-        box = np.rint(way / close)
-    return np.asarray(way[np.append(True, (box[1:] != box[:-1]).any(axis=1))])
+        box = np.rint(points / distance)
+    return np.asarray(points[np.append(True, (box[1:] != box[:-1]).any(axis=1))])
 
 
 def _time_of(plan: PathPlan, s: float) -> float:
@@ -195,17 +197,17 @@ def _time_of(plan: PathPlan, s: float) -> float:
     return high
 
 
-def _draw_from_near(plan: PathPlan, figure: Any, way: Array) -> None:
+def _draw_from_near(plan: PathPlan, figure: Any, tool_path: Array) -> None:
     """A way that is small beside the arm, seen along the axis in which it is thinnest."""
-    size = np.nanmax(way, axis=0) - np.nanmin(way, axis=0)
+    size = np.nanmax(tool_path, axis=0) - np.nanmin(tool_path, axis=0)
     i, j = sorted(np.argsort(size)[1:].tolist())
     axes = flat_axes(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
-    length = np.nansum(np.linalg.norm(np.diff(way, axis=0), axis=1))
+    length = np.nansum(np.linalg.norm(np.diff(tool_path, axis=0), axis=1))
     thin = float(np.clip(_INKED * size[i] * size[j] / max(length, 1e-9) / size.max(), *_WIDTHS))
-    axes.plot(way[:, i], way[:, j], color=_INK, linewidth=thin, label="the tool's way")
+    axes.plot(tool_path[:, i], tool_path[:, j], color=_INK, linewidth=thin, label="the tool's way")
     if plan.rounded_most is not None:
-        worst = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
-        axes.plot(worst[i], worst[j], color=_SINGULAR_COLOUR, marker="+", markersize=9, linestyle="none",
+        rounded_tip = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
+        axes.plot(rounded_tip[i], rounded_tip[j], color=_SINGULAR_COLOUR, marker="+", markersize=9, linestyle="none",
                   label="farthest from its point")  # fmt: skip
         axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncol=2, fontsize=8, borderpad=0.1)
     axes.tick_params(labelsize=7.5)
@@ -213,8 +215,9 @@ def _draw_from_near(plan: PathPlan, figure: Any, way: Array) -> None:
 
 def _other_starts(plan: PathPlan) -> list[Array]:
     """Joint values at the path's start of the branches that would carry it as well."""
-    taken = {run.names[0][1] for run in plan.runs[:1]}
-    return [b.start_joints for b in plan.branches if b.carries >= plan.length - 0.01 and b.name not in taken]
+    first_names = {run.names[0][1] for run in plan.runs[:1]}
+    carrying = [branch for branch in plan.branches if branch.carries >= plan.length - 0.01]
+    return [branch.start_joints for branch in carrying if branch.name not in first_names]
 
 
 def _draw_joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:
@@ -243,8 +246,8 @@ def _draw_shares(plan: PathPlan, axes: Any, t: Array, share: Array, label: str) 
     axes.set_ylabel(label, fontsize=8)
 
 
-def _draw_tool_speed(axes: Any, t: Array, fine: Array, tips: Array) -> None:
-    speed = np.linalg.norm(np.gradient(tips, fine, axis=0), axis=1)
-    axes.plot(t, _peaks(t, fine, speed[:, None])[:, 0], color=_INK, linewidth=1.0)
+def _draw_tool_speed(axes: Any, t: Array, fine_times: Array, tips: Array) -> None:
+    speed = np.linalg.norm(np.gradient(tips, fine_times, axis=0), axis=1)
+    axes.plot(t, _peaks(t, fine_times, speed[:, None])[:, 0], color=_INK, linewidth=1.0)
     axes.set_ylim(0.0, 1.1 * float(speed.max()) or 1.0)
     axes.set_ylabel("tool / mm/s", fontsize=8)

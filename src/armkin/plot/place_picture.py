@@ -24,16 +24,16 @@ def plot_place(places: Sequence[Place], out: str) -> None:
             width = 1.0 / len(places)
             axes = flat_axes(figure, ((number + 0.14) * width, 0.12, 0.66 * width, 0.7), ("x / mm", "y / mm"))
             share = place.reached.max(axis=2).T / place.of
-            half = 0.5 * float(place.x[1] - place.x[0] if len(place.x) > 1 else 50.0)
-            corners = (place.x[0] - half, place.x[-1] + half, place.y[0] - half, place.y[-1] + half)
-            drawn = axes.imshow(share, origin="lower", extent=corners, vmin=0, vmax=1, cmap="viridis")
+            half_step = 0.5 * float(place.x[1] - place.x[0] if len(place.x) > 1 else 50.0)
+            corners = (place.x[0] - half_step, place.x[-1] + half_step, place.y[0] - half_step, place.y[-1] + half_step)
+            image = axes.imshow(share, origin="lower", extent=corners, vmin=0, vmax=1, cmap="viridis")
             x, y, yaw = *place.xyz[:2], float(place.yaw[place.best[2]])
             size = 0.15 * place.arm.reach
             axes.plot(*_heading_stroke(x, y, yaw, size), color="white", lw=3.5)
             axes.plot(*_heading_stroke(x, y, yaw, size), color=INK, lw=1.5)
             _draw_arm(axes, place)
             axes.plot([x], [y], "o", color=INK, mec="white", ms=8)
-            bar = figure.colorbar(drawn, cax=figure.add_axes(((number + 0.83) * width, 0.15, 0.02 * width, 0.64)))
+            bar = figure.colorbar(image, cax=figure.add_axes(((number + 0.83) * width, 0.15, 0.02 * width, 0.64)))
             bar.outline.set_visible(False)
             left = (number + 0.05) * width
             text = f"best: {x:g}, {y:g} mm, {np.degrees(yaw):g} deg, {int(place.reached[place.best])} of {place.of}"

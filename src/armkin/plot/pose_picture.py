@@ -53,18 +53,18 @@ def plot_poses(
     out: None opens a window.
     """
     poses = _check_poses(arm, q, names)
-    alone = len(poses) == 1
-    shown = poses if names is not None else poses[_spread_indices(len(poses))]
-    bones = [skeleton(arm, pose) for pose in shown]
-    legal: list[bool] = np.logical_not(outside_limits(arm, shown).any(axis=1)).tolist()
-    hit = _hit_texts(arm, shown)
+    is_single = len(poses) == 1
+    drawn_poses = poses if names is not None else poses[_spread_indices(len(poses))]
+    bones = [skeleton(arm, pose) for pose in drawn_poses]
+    legal: list[bool] = np.logical_not(outside_limits(arm, drawn_poses).any(axis=1)).tolist()
+    hit = _hit_texts(arm, drawn_poses)
     legend = ["start", "end"] if names is None else _legend_texts(names, legal, hit)
-    with picture(out, 8.0 if alone else 9.6, 5.8) as figure:
-        track = None if alone or names is not None else fk(arm, _joint_way(poses))[:, :3, 3]
+    with picture(out, 8.0 if is_single else 9.6, 5.8) as figure:
+        track = None if is_single or names is not None else fk(arm, _joint_way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
         drawing.draw_keep_outs()
         notes = []
-        if alone:
+        if is_single:
             drawing.draw_single(bones[0], _HIT if hit[0] else PALETTE[0])
             drawing.name_joints(bones[0])
             notes = _notes_of_one(bones[0], legal[0], hit[0])
@@ -72,11 +72,11 @@ def plot_poses(
             _draw_several(drawing, bones, legend, legal, hit, in_turn=names is None)
         if track is not None:
             drawing.draw_track(track)
-        if alone if frames is None else frames:
-            notes.append(drawing.draw_frames(shown))
+        if is_single if frames is None else frames:
+            notes.append(drawing.draw_frames(drawn_poses))
         if target is not None:
             drawing.mark_target(np.asarray(target, dtype=float))
-        drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if alone else legend)
+        drawing.finish(arm.name if title is None else title, ";  ".join(notes), None if is_single else legend)
 
 
 def _draw_several(
@@ -149,8 +149,8 @@ class _Drawing:
         track: Array | None,
     ) -> None:
         self.robot, self.figure = arm, figure
-        ways = [] if track is None else [track]
-        self.points = np.concatenate([*(bone.path for bone in bones), *ways, arm.base[None, :3, 3]])
+        tracks = [] if track is None else [track]
+        self.points = np.concatenate([*(bone.path for bone in bones), *tracks, arm.base[None, :3, 3]])
         normal, _ = tip_freedoms(arm)
         self.planar = view is None and normal is not None and bool(abs(normal[2]) > 1 - 1e-9)
         self.size = float(np.ptp(self.points, axis=0).max()) or arm.reach
@@ -193,12 +193,12 @@ class _Drawing:
         for place, names in groups:
             point = place[: self.dimensions]
             halo = import_module("matplotlib.patheffects").withStroke(linewidth=2.5, foreground="white")
-            beside = {"fontsize": 9.5, "color": INK, "zorder": 9, "path_effects": [halo]}
+            style = {"fontsize": 9.5, "color": INK, "zorder": 9, "path_effects": [halo]}
             if self.dimensions == 2:
                 offset = {"xytext": (7, -13), "textcoords": "offset points"}
-                self.axes.annotate(", ".join(names), point, **offset, **beside)
+                self.axes.annotate(", ".join(names), point, **offset, **style)
             else:
-                self.axes.text(point[0], point[1], point[2] + 0.035 * self.size, "   " + ", ".join(names), **beside)
+                self.axes.text(point[0], point[1], point[2] + 0.035 * self.size, "   " + ", ".join(names), **style)
 
     def draw_line(self, points: Array, **style: Any) -> None:
         """A line through points, in the plane or in space."""
@@ -215,8 +215,8 @@ class _Drawing:
             self._draw_dots(bone, colour, 9.0)
         else:
             for centre, axis in zip(bone.joints, bone.axes, strict=True):
-                half = 0.035 * self.size * axis
-                ends = np.array([centre - half, centre + half])
+                half_length = 0.035 * self.size * axis
+                ends = np.array([centre - half_length, centre + half_length])
                 self.draw_line(ends, color=INK, linewidth=9.0, solid_capstyle="butt", zorder=4)
         self.draw_line(bone.tip[None], color=colour, marker="o", markersize=7, zorder=5)
 
@@ -307,8 +307,8 @@ def _spread_indices(count: int) -> NDArray[np.int64]:
 
 def _joint_way(poses: Array) -> Array:
     """Joint values along a path (K, n) -> (M, n): straight from each pose to the next, as joints move."""
-    between = max(1, min(_WAY_POINTS, MAX_POSES // len(poses)))
-    share = np.arange(between)[:, None] / between
+    step_count = max(1, min(_WAY_POINTS, MAX_POSES // len(poses)))
+    share = np.arange(step_count)[:, None] / step_count
     steps = poses[:-1, None] + share * np.diff(poses, axis=0)[:, None]
     return np.concatenate([steps.reshape(-1, poses.shape[1]), poses[-1:]])
 
@@ -317,9 +317,9 @@ def _extra_widths(bones: Sequence[Skeleton]) -> Array:
     """How much wider each skeleton is drawn because it lies on earlier ones: wrist flips move no corner."""
     rank = np.zeros(len(bones))
     for k, bone in enumerate(bones):
-        for earlier in bones[:k]:
-            same = bone.path.shape == earlier.path.shape
-            rank[k] += same and bool(np.allclose(bone.path, earlier.path, rtol=0, atol=1e-3 * np.ptp(bone.path)))
+        for other_bone in bones[:k]:
+            is_same = bone.path.shape == other_bone.path.shape
+            rank[k] += is_same and bool(np.allclose(bone.path, other_bone.path, rtol=0, atol=1e-3 * np.ptp(bone.path)))
     return rank * min(3.2, 9.6 / max(float(rank.max()), 1.0))
 
 

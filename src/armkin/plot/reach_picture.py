@@ -29,13 +29,13 @@ def plot_reach(reach: Reach, out: str) -> None:
         for column, (name, label) in enumerate(_SHOWN):
             values = np.where(share > 0, reach.columns[name], np.nan)
             left = 0.075 + 0.32 * column
-            above = flat_axes(figure, (left, 0.53, 0.195, 0.34), ("x / mm", "z / mm"))
-            below = flat_axes(figure, (left, 0.09, 0.195, 0.34), ("x / mm", "y / mm"))
-            most = 1.0 if name != "branches" else max(float(np.nanmax(values, initial=1.0)), 1.0)
-            drawn = _draw_squares(above, side, values, grid.step, most)
-            _draw_squares(below, slab, values, grid.step, most)
+            side_axes = flat_axes(figure, (left, 0.53, 0.195, 0.34), ("x / mm", "z / mm"))
+            slab_axes = flat_axes(figure, (left, 0.09, 0.195, 0.34), ("x / mm", "y / mm"))
+            greatest = 1.0 if name != "branches" else max(float(np.nanmax(values, initial=1.0)), 1.0)
+            mesh = _draw_squares(side_axes, side, values, grid.step, greatest)
+            _draw_squares(slab_axes, slab, values, grid.step, greatest)
             place = figure.add_axes((left + 0.205, 0.15, 0.008, 0.66))
-            bar = figure.colorbar(drawn, cax=place)
+            bar = figure.colorbar(mesh, cax=place)
             bar.outline.set_visible(False)
             figure.text(left, 0.9, label, fontsize=10, color=INK)
         orientations_text = f"{reach.orientations:,} orientation{'s' * (reach.orientations != 1)} each"
@@ -57,10 +57,10 @@ def _fullest_level(levels: Array, weight: Array) -> int:
     return int(names[np.bincount(index, weight).argmax()])
 
 
-def _draw_squares(axes: Any, layer: voxels.Layer, values: Array, step: float, most: float) -> Any:
+def _draw_squares(axes: Any, layer: voxels.Layer, values: Array, step: float, greatest: float) -> Any:
     """A plane of voxels: centres at half steps along x, at whole ones along the other axis."""
     table = layer.table(values)
     low = layer.places.min(axis=0)
-    across = (low[0] + np.arange(table.shape[1] + 1)) * step
-    up = (low[1] - 0.5 + np.arange(table.shape[0] + 1)) * step
-    return axes.pcolormesh(across, up, table, vmin=0.0, vmax=most, cmap="viridis", rasterized=True)
+    x_edges = (low[0] + np.arange(table.shape[1] + 1)) * step
+    y_edges = (low[1] - 0.5 + np.arange(table.shape[0] + 1)) * step
+    return axes.pcolormesh(x_edges, y_edges, table, vmin=0.0, vmax=greatest, cmap="viridis", rasterized=True)

@@ -44,7 +44,7 @@ def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulabil
     with picture(out, 8.0, 6.2) as figure:
         if flat_arm:
             axes = flat_axes(figure, (0.11, 0.1, 0.72, 0.76), ("x / mm", "y / mm"))
-            drawn = _draw_spots(axes, tips[:, 0], tips[:, 1], values, 140)
+            hexagons = _draw_spots(axes, tips[:, 0], tips[:, 1], values, 140)
             bar = figure.add_axes((0.87, 0.1, 0.022, 0.76))
         else:
             base = workspace.arm.base
@@ -61,13 +61,13 @@ def plot_workspace(workspace: Workspace, out: str, *, colour: str = "manipulabil
                 rasterized=True,
             )
             true_proportions(cloud, tips, float(tips[:, 2].min()), ticks=5.5)
-            above = flat_axes(figure, (0.675, 0.545, 0.305, 0.345), ("x / mm", "y / mm"), shrink=True)
-            drawn = _draw_spots(above, tips[:, 0], tips[:, 1], values, 90)
+            top_axes = flat_axes(figure, (0.675, 0.545, 0.305, 0.345), ("x / mm", "y / mm"), shrink=True)
+            hexagons = _draw_spots(top_axes, tips[:, 0], tips[:, 1], values, 90)
             side = flat_axes(figure, (0.675, 0.095, 0.305, 0.345), ("r / mm", "z / mm"), shrink=True)
             _draw_spots(side, np.hypot(round_base[:, 0], round_base[:, 1]), round_base[:, 2], values, 90)
             side.set_xlim(left=min(0.0, side.get_xlim()[0]))  # the base's axis is part of the picture
             bar = figure.add_axes((0.06, 0.1, 0.44, 0.022))
-        _draw_bar(figure, bar, drawn, _LABELS[colour], upright=flat_arm)
+        _draw_bar(figure, bar, hexagons, _LABELS[colour], upright=flat_arm)
         figure.text(0.03, 0.97, workspace.arm.name if title is None else title, fontsize=13, va="top", color=INK)
         figure.text(0.03, 0.92, _caption(workspace), fontsize=10, va="top", color=SOFT)
 
@@ -89,8 +89,8 @@ def _is_level(tips: Array) -> bool:
 
 def _far_to_near(tips: Array, azimuth: float) -> Any:
     """Order of drawing: what is nearer to the eye covers what is behind."""
-    toward = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.35])
-    return np.argsort(tips @ toward)
+    view_direction = np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.35])
+    return np.argsort(tips @ view_direction)
 
 
 def _draw_spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> Any:
@@ -101,13 +101,13 @@ def _draw_spots(axes: Any, x: Array, y: Array, values: Array, columns: int) -> A
     width, height = float(np.ptp(x)) or 1.0, float(np.ptp(y)) or 1.0
     size = max(width, height) / columns
     grid = (max(1, round(width / size)), max(1, round(height / size / np.sqrt(3))))
-    drawn = axes.hexbin(x, y, C=values, gridsize=grid, cmap="viridis", linewidths=0.25, edgecolors="face")
-    drawn.set_clim(float(values.min()), float(values.max()))
-    return drawn
+    hexagons = axes.hexbin(x, y, C=values, gridsize=grid, cmap="viridis", linewidths=0.25, edgecolors="face")
+    hexagons.set_clim(float(values.min()), float(values.max()))
+    return hexagons
 
 
-def _draw_bar(figure: Any, place: Any, drawn: Any, label: str, upright: bool) -> None:
-    bar = figure.colorbar(drawn, cax=place, orientation="vertical" if upright else "horizontal")
+def _draw_bar(figure: Any, place: Any, hexagons: Any, label: str, upright: bool) -> None:
+    bar = figure.colorbar(hexagons, cax=place, orientation="vertical" if upright else "horizontal")
     bar.outline.set_visible(False)
     bar.set_label(label, labelpad=5)
     place.tick_params(length=3)

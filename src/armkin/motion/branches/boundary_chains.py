@@ -57,9 +57,11 @@ def add_boundary_chains(
 def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
     """The inner samples on a boundary near which a chain ends; an empty list if there are too many."""
     ends = np.unique([sample for chain in chains for sample in (chain.first, chain.last)])
-    inner = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
+    boundary_rows = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
     near_ends = [
-        row for row in inner.tolist() if len(ends) and np.abs(columns.s[ends] - columns.s[row]).min() <= _END_DISTANCE
+        row
+        for row in boundary_rows.tolist()
+        if len(ends) and np.abs(columns.s[ends] - columns.s[row]).min() <= _END_DISTANCE
     ]
     return near_ends if len(near_ends) <= _MAX_BOUNDARIES else []
 

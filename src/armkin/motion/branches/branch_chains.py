@@ -53,19 +53,19 @@ class Chain:
         None in place of the second: all copies are legal everywhere.
         """
         copies: list[tuple[Array, Int | None]] = []
-        least, greatest = self.extent
+        lowest, highest = self.extent
         turns = whole_turns(self.arm)
         for joint in range(self.arm.n):
             lower, upper, value = self.arm.lower[joint] - SLACK, self.arm.upper[joint] + SLACK, self.q[:, joint]
             offsets, turn = np.zeros(1), turns[joint]
             if not self.arm.prismatic[joint] and np.isfinite(lower) and np.isfinite(upper):
-                first = np.ceil((lower - greatest[joint]) / turn)
-                last = np.floor((upper - least[joint]) / turn)
+                first = np.ceil((lower - highest[joint]) / turn)
+                last = np.floor((upper - lowest[joint]) / turn)
                 offsets = turn * np.arange(first, last + 1)
             elif not self.arm.prismatic[joint] and (np.isfinite(lower) or np.isfinite(upper)):
                 middle = np.rint((self.arm.home[joint] - value[0]) / turn)
                 offsets = turn * (middle + np.arange(-2, 3))
-            legal = (least[joint] + offsets >= lower) & (greatest[joint] + offsets <= upper)
+            legal = (lowest[joint] + offsets >= lower) & (highest[joint] + offsets <= upper)
             if len(offsets) and legal.all():
                 copies.append((offsets, None))
                 continue
@@ -164,8 +164,8 @@ def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int
     q = np.concatenate(parts, axis=1, out=np.empty((arm.n, size))).T
     labels = np.concatenate([columns.name[a : b + 1, column] for a, b, column in blocks])
     chain = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
-    least, greatest = chain.extent
-    for joint in np.flatnonzero(~arm.prismatic & (greatest - least > np.pi)):  # principal values may jump by a turn
+    lowest, highest = chain.extent
+    for joint in np.flatnonzero(~arm.prismatic & (highest - lowest > np.pi)):  # principal values may jump by a turn
         turn = whole_turns(arm)[joint]
         turns = np.rint(np.diff(q[:, joint]) / turn)
         if turns.any():

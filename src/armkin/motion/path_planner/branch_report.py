@@ -30,14 +30,14 @@ _WHY = {
 }
 
 
-def note_runs(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
+def note_runs(plan: PathPlan, carried_route: CarriedRoute, near: Array) -> None:
     """Add runs, branches and breaks of a group of moves to the plan."""
-    columns, offset, arm = carried.columns, plan.length, plan.arm
+    columns, offset, arm = carried_route.columns, plan.length, plan.arm
     plan.samples += len(columns.s)
     plan.complete = plan.complete and columns.complete
     if not plan.branches:
-        plan.branches = _start_branches(arm, carried, near)
-    for run_number, run in enumerate(carried.runs):
+        plan.branches = _start_branches(arm, carried_route, near)
+    for run_number, run in enumerate(carried_route.runs):
         for window in run.chain.windows:
             if columns.s[run.first] <= window.begin and window.end <= columns.s[run.last]:
                 plan.passed.append(Passed(offset + window.begin, offset + window.end, window.turned, window.tip_offset))
@@ -45,7 +45,7 @@ def note_runs(plan: PathPlan, carried: CarriedRoute, near: Array) -> None:
         begin, end = offset + float(columns.s[run.first]), offset + float(columns.s[run.last])
         if end > begin:
             plan.runs.append(PathRun(begin, end, _branch_names(columns, run, offset), q[0].copy(), q[-1].copy()))
-        if run.last < len(columns.s) - 1 or run_number + 1 < len(carried.runs):
+        if run.last < len(columns.s) - 1 or run_number + 1 < len(carried_route.runs):
             plan.reconfigurations.append(_reconfiguration_at(arm, columns, run.chain, run.first, offset))
 
 
@@ -59,10 +59,10 @@ def _branch_names(columns: Columns, run: Run, offset: float) -> list[tuple[float
     ]
 
 
-def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch]:
+def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[Branch]:
     """The branches at the start, sorted by how far each carries; of equal ones the chosen branch comes first."""
-    columns, ranked, first_run_branch = carried.columns, [], None
-    for chain in carried.chains:
+    columns, ranked, first_run_branch = carried_route.columns, [], None
+    for chain in carried_route.chains:
         if chain.first == 0:
             last = chain.carries_to(0)
             joints = chain.joints(0, last, near) if last >= 0 else chain.q
@@ -70,7 +70,7 @@ def _start_branches(arm: Arm, carried: CarriedRoute, near: Array) -> list[Branch
             length = float(columns.s[last]) if last >= 0 else 0.0
             end_text = reason_text(arm, _reconfiguration_at(arm, columns, chain, 0, 0.0))
             ranked.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
-            if carried.runs and chain is carried.runs[0].chain:
+            if carried_route.runs and chain is carried_route.runs[0].chain:
                 first_run_branch = ranked[-1][1]
     ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not first_run_branch))
     distinct: list[Branch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
@@ -246,27 +246,27 @@ def _in_units(arm: Arm, joint: int, value: float) -> float:
     return value if arm.prismatic[joint] else value / units.DEGREE
 
 
-def path_refusal(plan: PathPlan, carried: CarriedRoute, branch: str | None = None) -> NoSolutionError:
+def path_refusal(plan: PathPlan, carried_route: CarriedRoute, branch: str | None = None) -> NoSolutionError:
     """The error of a path that no branch carries, with its plan; branch: the name that the user asked for."""
     best_branch, joints = plan.branches[0] if plan.branches else None, None
-    length = carried.route.length
+    length = carried_route.route.length
     if best_branch is None:
         text = "the path's first point is out of reach"
-    elif branch is not None and (not carried.runs or carried.runs[0].first > 0):
+    elif branch is not None and (not carried_route.runs or carried_route.runs[0].first > 0):
         text = f"branch '{branch}' is not within the limits at the path's start; "
         text += f"{best_branch.name or 'another'} carries {best_branch.carries:.3f} of {length:.3f} mm"
-    elif not carried.runs or carried.runs[0].first > 0:
+    elif not carried_route.runs or carried_route.runs[0].first > 0:
         text = f"no branch is within the limits at the path's start: {best_branch.ends_because}"
     else:
-        carried_length = float(carried.columns.s[carried.runs[0].last])
+        carried_length = float(carried_route.columns.s[carried_route.runs[0].last])
         text = f"no branch carries the whole path: {carried_length:.3f} of {length:.3f} mm, then "
         text += reason_text(plan.arm, plan.reconfigurations[0])
         joints = plan.reconfigurations[0].joints
-        changes = len(carried.runs) - 1
-        if carried.covered:
+        changes = len(carried_route.runs) - 1
+        if carried_route.covered:
             text += f"; with {changes} change{'s' * (changes > 1)} of branch it can be done"
     plan.length += length
-    fields: dict[str, Any] = {"splittable": carried.covered}
+    fields: dict[str, Any] = {"splittable": carried_route.covered}
     if joints is not None:
         fields["joints"] = units.joints_out(plan.arm, joints).tolist()
     error = NoSolutionError(f"{text}: nothing was moved", **fields)

@@ -33,8 +33,8 @@ def _do_point(walk: Walk, move: Move, value: list[float]) -> None:
     walk.begin_group(goal, move.branch)
 
 
-def _add_line(walk: Walk, move: Move, value: list[float], inner: bool = False) -> None:
-    corner = walk.corner_blend(move, inner)
+def _add_line(walk: Walk, move: Move, value: list[float], is_inner: bool = False) -> None:
+    corner = walk.corner_blend(move, is_inner)
     if corner is not None and walk.dense is None:
         walk.add_piece(move, piece_shapes.line(walk.task, walk.spot, walk.target(value)))
         return
@@ -44,11 +44,11 @@ def _add_line(walk: Walk, move: Move, value: list[float], inner: bool = False) -
 
 
 def _add_polyline(walk: Walk, move: Move, value: list[list[float]]) -> None:
-    if walk.corner_blend(move, inner=True) is None:  # the inner points form one curve; the last has its own corner
+    if walk.corner_blend(move, is_inner=True) is None:  # the inner points form one curve; the last has its own corner
         _gather_points(walk, move, value[:-1])
         value = value[-1:]
     for index, target in enumerate(value):
-        _add_line(walk, move, target, inner=index < len(value) - 1)
+        _add_line(walk, move, target, is_inner=index < len(value) - 1)
 
 
 def _gather_points(walk: Walk, move: Move, targets: list[list[float]]) -> None:

@@ -172,12 +172,12 @@ class Walk:
         # fitted curves meet where the path turns back; a blend there would miss the neighbouring points
         self.blends += [None if a.dense is None and b.dense is None else 0.0 for a, b in pairwise(pieces)] + [corner]
 
-    def corner_blend(self, move: Move, inner: bool = False) -> float | None:
+    def corner_blend(self, move: Move, is_inner: bool = False) -> float | None:
         """The radius [mm] of the blend at the end of a move; None: the tolerance decides."""
         if move.blend is not None:
             return move.blend
         if self.options.corner == "default":
-            return None if inner else 0.0
+            return None if is_inner else 0.0
         return self.options.corner
 
     def keep_typed_turns(self, sums: Array) -> None:
@@ -262,14 +262,14 @@ class Walk:
     def _runs(self, route: Route, near: Array, *, any_branch: bool) -> tuple[Array, list[Run]]:
         """A route's samples and the runs that carry it; all other branches are dropped to free their memory."""
         branch = (self.goal_branch or self.options.branch) if any_branch else None
-        carried = carry_route(
+        carried_route = carry_route(
             self.arm, route, near=near, tolerance=self.pace.tolerance, pace=self.pace,
             fixed=None if any_branch else self.q, branch=branch, count=self.options.samples
         )  # fmt: skip
-        branch_report.note_runs(self.plan, carried, near)
-        if not carried.in_one_run and not (self.options.split and carried.covered):
-            raise branch_report.path_refusal(self.plan, carried, branch)
-        return carried.columns.s, carried.moving_runs
+        branch_report.note_runs(self.plan, carried_route, near)
+        if not carried_route.in_one_run and not (self.options.split and carried_route.covered):
+            raise branch_report.path_refusal(self.plan, carried_route, branch)
+        return carried_route.columns.s, carried_route.moving_runs
 
     def append_curves(
         self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed

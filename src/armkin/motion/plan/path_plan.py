@@ -156,11 +156,11 @@ class PathPlan:
         """
         for i in range(0, len(q), _BLOCK_TIMES):
             candidates = _worst_conditioned(self.arm, q[i : i + _BLOCK_TIMES])
-            worst = condition(self.arm, q[i + candidates])
-            k = int(np.argmax(worst))
-            if self.nearest_singularity is None or worst[k] > self.nearest_singularity[1]:
+            conditions = condition(self.arm, q[i + candidates])
+            k = int(np.argmax(conditions))
+            if self.nearest_singularity is None or conditions[k] > self.nearest_singularity[1]:
                 index = i + candidates[k]
-                self.nearest_singularity = (self.length + float(s[index]), float(worst[k]), q[index].copy())
+                self.nearest_singularity = (self.length + float(s[index]), float(conditions[k]), q[index].copy())
 
     def set_motion(self, start: Array, stretches: Sequence[Stretch], markers: list[Marker]) -> PathPlan:
         """This plan with its motion from a posture on.

@@ -28,10 +28,10 @@ def sample_times(arm: Arm, plan: PathPlan, begins: list[float], accuracy: float,
     a, b = t[:-1], t[1:]  # intervals that may be divided
     errors = _drawn_error(arm, plan, a, b)
     parts = [t]
-    worst, room = 0.0, max_count - len(t)
+    largest_error, room = 0.0, max_count - len(t)
     while True:
         too_far = (errors > accuracy) & (b - a > 1e-3)
-        worst = max(worst, float(errors[~too_far].max(initial=0.0)))
+        largest_error = max(largest_error, float(errors[~too_far].max(initial=0.0)))
         a, b, errors = a[too_far], b[too_far], errors[too_far]
         if not len(a) or room <= 0:
             break
@@ -44,7 +44,7 @@ def sample_times(arm: Arm, plan: PathPlan, begins: list[float], accuracy: float,
         first, last = np.concatenate([a[order], middle]), np.concatenate([middle, b[order]])
         a, b = (np.concatenate([np.delete(values, order), added]) for values, added in ((a, first), (b, last)))
         errors = np.concatenate([np.delete(errors, order), _drawn_error(arm, plan, first, last)])
-    return np.unique(np.concatenate(parts)), max(worst, float(errors.max(initial=0.0)))
+    return np.unique(np.concatenate(parts)), max(largest_error, float(errors.max(initial=0.0)))
 
 
 def _drawn_error(arm: Arm, plan: PathPlan, a: Array, b: Array) -> Array:

@@ -238,7 +238,7 @@ def _geometries(trajectory: Trajectory) -> list[tuple[int, JointMotion]]:
 
 def _proof_on_trajectory(
     trajectory: Trajectory,
-    held: Guard,
+    guard: Guard,
     first: int,
     proof: Proof,
     escaping: tuple[int, ...],
@@ -248,15 +248,15 @@ def _proof_on_trajectory(
     """Convert a proof of a part to stretches, joint values and names of the trajectory."""
     stretch, cell = first, proof.place
     if isinstance(motion, Cubics):
-        sizes = [_cell_count(later) for later in trajectory.stretches[first:]]
+        sizes = [_cell_count(later_stretch) for later_stretch in trajectory.stretches[first:]]
         while cell >= sizes[stretch - first] and stretch + 1 < len(trajectory.stretches):
             if not isinstance(trajectory.stretches[stretch + 1], Straight | Curve):
                 break
             cell -= sizes[stretch - first]
             stretch += 1
-    body, keep_out = ("", "") if proof.pair is None else held.pair_names(proof.pair)
+    body, keep_out = ("", "") if proof.pair is None else guard.pair_names(proof.pair)
     joints = motion.joints_at(np.array([proof.place]))[0]
-    pairs = tuple(held.pair_names(k) for k in escaping)
+    pairs = tuple(guard.pair_names(k) for k in escaping)
     return TrajectoryProof(
         free=proof.free,
         mm=proof.mm,

@@ -49,8 +49,8 @@ def _part_cap(arm: Arm, path: Knots, share: float) -> Array:
     slowing = -ratio * np.sign(lead)[:, None] * brakes[leader][:, None]
     max_accel = share * arm.max_accel
     for second, part in ((ends[0], slice(None, -1)), (ends[1], slice(1, None))):
-        turned = (second * gain[leader[part]]).sum(axis=1)
-        bend = second - ratio[part] * turned[:, None]
+        leader_bend = (second * gain[leader[part]]).sum(axis=1)
+        bend = second - ratio[part] * leader_bend[:, None]
         margin = max_accel - np.sign(bend) * slowing[part]
         interval_cap = np.maximum(margin, 0.0) / np.maximum(np.abs(bend), TINY)
         caps[part] = np.minimum(caps[part], interval_cap.min(axis=1))

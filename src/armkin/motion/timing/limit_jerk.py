@@ -90,8 +90,8 @@ class Smoothed:
             return np.asarray(self.start + (self._integral(end) - self._integral(begin)) / self.window)
         change = self.curve.evaluate(end, derivative - 1) - self.curve.evaluate(begin, derivative - 1)
         if derivative == 2:  # the curve is at rest outside its duration, where evaluate clips to its ends
-            inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (end, begin)]
-            change = self.curve.evaluate(end, 1) * inside[0] - self.curve.evaluate(begin, 1) * inside[1]
+            is_inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (end, begin)]
+            change = self.curve.evaluate(end, 1) * is_inside[0] - self.curve.evaluate(begin, 1) * is_inside[1]
         return np.asarray(change / self.window)
 
 

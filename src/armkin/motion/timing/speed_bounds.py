@@ -120,8 +120,8 @@ class Fastest:
         self.cap[:-1][intervals] = feasible
         forward, count = forward_step(h, slope, level), len(h)
         a, b = (np.concatenate(terms, axis=1) for terms in zip(backward_step(*forward), forward, strict=True))
-        least = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], feasible]))
-        return least.part(0, count), least.part(count, 2 * count)
+        functions = least_of(a, b, np.concatenate([self.cap[1:][intervals][::-1], feasible]))
+        return functions.part(0, count), functions.part(count, 2 * count)
 
 
 def interval_parts(intervals: int) -> list[slice]:

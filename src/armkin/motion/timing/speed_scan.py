@@ -36,7 +36,7 @@ class Least(NamedTuple):
         return lowest
 
     def part(self, begin: int, end: int) -> Least:
-        """The least functions of intervals lo to hi."""
+        """The least functions of intervals `begin` to `end`."""
         first, last = np.searchsorted(self.interval, [begin, end])
         a0, b0, a1, b1 = (values[begin:end] for values in (self.a0, self.b0, self.a1, self.b1))
         return Least(a0, b0, a1, b1, self.interval[first:last] - begin, self.slope[first:last], self.level[first:last])
@@ -88,7 +88,7 @@ def backward_step(keep: Array, gain: Array) -> tuple[Array, Array]:
     return e[:, ::-1], np.where(keep > 0, gain * e, np.inf)[:, ::-1]
 
 
-def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
+def scan(top: Array, functions: Least, previous: Array | None = None) -> Array:
     """y[0] = top[0], y[i+1] = min(top[i+1], least_i(y[i])), not below 0.
 
     previous: the y of another top and least that differ in some intervals. Most intervals are still consistent: y[i+1]
@@ -97,43 +97,43 @@ def scan(top: Array, least: Least, previous: Array | None = None) -> Array:
     y = (top if previous is None else previous).copy()
     y[0] = top[0]
     # The index of each interval's first function.
-    first = np.append(0, np.cumsum(np.bincount(least.interval, minlength=len(top) - 1)))
+    first = np.append(0, np.cumsum(np.bincount(functions.interval, minlength=len(top) - 1)))
     for _ in range(_MAX_ROUNDS):
-        reached = least.values(y[:-1])
-        changed = (np.minimum(top[1:], np.where(reached > 0.0, reached, 0.0)) != y[1:]).nonzero()[0]
+        next_values = functions.values(y[:-1])
+        changed = (np.minimum(top[1:], np.where(next_values > 0.0, next_values, 0.0)) != y[1:]).nonzero()[0]
         heads = changed[np.diff(changed, prepend=-2) > 1]  # a run passes the intervals right behind its head
         if len(heads) <= _MANY_RUNS:
             break
-        _follow_runs(y, least, first, heads, top)
+        _follow_runs(y, functions, first, heads, top)
     end = 0
     for begin in changed.tolist():
         if begin >= end:
-            end = _follow_run(y, least, first, begin, top)
+            end = _follow_run(y, functions, first, begin, top)
     return y
 
 
-def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> None:
+def _follow_runs(y: Array, functions: Least, first: Int, heads: Int, top: Array) -> None:
     """Scan runs from their heads (r,) until they meet y, and write those that no earlier run has passed."""
     k, current = heads, y[heads]
     run, end = np.arange(len(heads)), len(y) - 1
     ends = np.full(len(heads), end)
     steps: list[tuple[Int, Int, Array]] = []
     while len(k):
-        value = np.minimum(least.a0[k] * current + least.b0[k], least.a1[k] * current + least.b1[k])
+        value = np.minimum(functions.a0[k] * current + functions.b0[k], functions.a1[k] * current + functions.b1[k])
         begin = first[k]
         count = first[k + 1] - begin
         for i in range(int(count.max())):
             rows = (count > i).nonzero()[0]
             row = begin[rows] + i
-            value[rows] = np.minimum(value[rows], least.slope[row] * current[rows] + least.level[row])
+            value[rows] = np.minimum(value[rows], functions.slope[row] * current[rows] + functions.level[row])
         k = k + 1
         current = np.minimum(top[k], np.where(value > 0.0, value, 0.0))
         differs = current != y[k]
         ends[run[~differs]] = k[~differs]
         k, current, run = k[differs], current[differs], run[differs]
         steps.append((run, k, current))
-        inside = k < end
-        k, current, run = k[inside], current[inside], run[inside]
+        goes_on = k < end
+        k, current, run = k[goes_on], current[goes_on], run[goes_on]
         if len(steps) > _MAX_STEPS and len(k) <= _MANY_RUNS:  # the others are scanned one by one
             ends[run] = k
             break
@@ -146,40 +146,40 @@ def _follow_runs(y: Array, least: Least, first: Int, heads: Int, top: Array) -> 
         y[k[rows]] = current[rows]
 
 
-def _functions_by_interval(least: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
+def _functions_by_interval(functions: Least, intervals: slice) -> dict[int, list[tuple[float, float]]]:
     """The further functions of some intervals, by interval."""
-    functions: dict[int, list[tuple[float, float]]] = {}
-    for interval, slope, level in zip(*(column[intervals].tolist() for column in least[4:]), strict=True):
-        functions.setdefault(interval, []).append((slope, level))
-    return functions
+    by_interval: dict[int, list[tuple[float, float]]] = {}
+    for interval, slope, level in zip(*(column[intervals].tolist() for column in functions[4:]), strict=True):
+        by_interval.setdefault(interval, []).append((slope, level))
+    return by_interval
 
 
-def _follow_run(y: Array, least: Least, first: Int, k: int, caps: Array) -> int:
+def _follow_run(y: Array, functions: Least, first: Int, k: int, caps: Array) -> int:
     """Update y[k+1], ... until a value is unchanged, and return its index."""
     current, size = float(y[k]), _MIN_INTERVALS
     while True:
         end = min(k + size, len(y) - 1)
-        functions = _functions_by_interval(least, slice(first[k], first[end]))
-        values = _scan_intervals(current, least, functions, range(k, end), caps)
-        current, before = values[-1], y[end]
+        by_interval = _functions_by_interval(functions, slice(first[k], first[end]))
+        values = _scan_intervals(current, functions, by_interval, range(k, end), caps)
+        current, old_value = values[-1], y[end]
         y[k + 1 : end + 1] = values
-        if current == before or end == len(y) - 1:
+        if current == old_value or end == len(y) - 1:
             return end
         k, size = end, min(2 * size, _MAX_INTERVALS)
 
 
 def _scan_intervals(
-    current: float, least: Least, functions: dict[int, list[tuple[float, float]]], intervals: range, caps: Array
+    current: float, functions: Least, by_interval: dict[int, list[tuple[float, float]]], intervals: range, caps: Array
 ) -> list[float]:
     """What the scan reaches behind each of the intervals from `current` before the first; functions: further ones."""
     values: list[float] = []
     tops = caps[intervals.start + 1 : intervals.stop + 1].tolist()
-    rows = (column[intervals.start : intervals.stop].tolist() for column in least[:4])
+    rows = (column[intervals.start : intervals.stop].tolist() for column in functions[:4])
     for i, top, a0, b0, a1, b1 in zip(intervals, tops, *rows, strict=True):
         value, candidate = a0 * current + b0, a1 * current + b1
         if candidate < value:
             value = candidate
-        for a, b in functions.get(i, ()):
+        for a, b in by_interval.get(i, ()):
             candidate = a * current + b
             if candidate < value:
                 value = candidate

@@ -120,9 +120,9 @@ def refine_knots(path: Knots) -> Knots:
     return Knots(_interleave(s, path.s[-1:]), _interleave(q, path.q[-1:]), _interleave(d, path.d[-1:]))
 
 
-def _interleave(inside: Array, last: Array) -> Array:
+def _interleave(parts: Array, last: Array) -> Array:
     """Values at fractions of every interval, (parts, N - 1, ...), interval by interval, then the last value."""
-    return np.concatenate([inside.swapaxes(0, 1).reshape(-1, *last.shape[1:]), last])
+    return np.concatenate([parts.swapaxes(0, 1).reshape(-1, *last.shape[1:]), last])
 
 
 def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = None) -> Array:
@@ -145,20 +145,20 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
             return np.asarray(cap)
         limits = Bound(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
         law = Fastest(limits, cap)
-        worst, changed = np.ones(len(path.h)), np.arange(len(path.h))
+        excess, changed = np.ones(len(path.h)), np.arange(len(path.h))
         for count in range(_MAX_ROUNDS):
             for part in interval_parts(len(changed)):
-                worst[changed[part]] = _lower_law(law, limits, speed, changed[part], share=count < _SHARED_ROUNDS)
-            if worst.max() <= _EXCESS_FACTOR:
+                excess[changed[part]] = _lower_law(law, limits, speed, changed[part], share=count < _SHARED_ROUNDS)
+            if excess.max() <= _EXCESS_FACTOR:
                 return law.x
             if count < _MAX_ROUNDS - 1:
-                excessive, x = np.flatnonzero(worst > _SMALL_EXCESS), law.x
-                law.lower_speeds(_add_neighbours(excessive, len(worst)))
+                excessive, x = np.flatnonzero(excess > _SMALL_EXCESS), law.x
+                law.lower_speeds(_add_neighbours(excessive, len(excess)))
                 x_changed = law.x != x
-                changed = np.flatnonzero(x_changed[1:] | x_changed[:-1] | (worst > _SMALL_EXCESS))
+                changed = np.flatnonzero(x_changed[1:] | x_changed[:-1] | (excess > _SMALL_EXCESS))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests has its own factor
-        slower = np.maximum(np.maximum.reduceat(worst, begins), 1.0)
-        return np.asarray(law.x / np.append(np.repeat(slower, np.diff(np.append(begins, len(worst)))), slower[-1]))
+        slowdown = np.maximum(np.maximum.reduceat(excess, begins), 1.0)
+        return np.asarray(law.x / np.append(np.repeat(slowdown, np.diff(np.append(begins, len(excess)))), slowdown[-1]))
 
 
 def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, share: bool) -> Array:
@@ -166,14 +166,14 @@ def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, sha
     motion, x0, x1 = limits.motion_in(intervals), law.x[intervals], law.x[intervals + 1]
     accel_shares = motion.accel_shares(x0, x1)
     speed_shares = motion.squared_speed_shares(x0, x1, np.minimum(speed[intervals], speed[intervals + 1]).T)
-    worst = np.maximum(accel_shares.max(axis=0), speed_shares)
+    shares = np.maximum(accel_shares.max(axis=0), speed_shares)
     if share:
         law.share[:, intervals] /= np.where(accel_shares > _SMALL_EXCESS, accel_shares, 1.0)
-    excess = speed_shares if share else worst
+    excess = speed_shares if share else shares
     excessive = np.flatnonzero(excess > _SMALL_EXCESS)
     for points, x in ((intervals[excessive], x0[excessive]), (intervals[excessive] + 1, x1[excessive])):
         np.fmin.at(law.cap, points, x / excess[excessive])
-    return np.asarray(worst)
+    return np.asarray(shares)
 
 
 def _add_neighbours(intervals: Int, count: int) -> Int:

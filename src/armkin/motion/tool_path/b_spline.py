@@ -38,24 +38,24 @@ class Layout:
     def from_points(u: Array, curve: Int, knot: Bool) -> Layout:
         """The layout of points u on curves (numbers from 0, in order), some of which are knots: (N,) each."""
         places, curves = u[knot], curve[knot]
-        inner = np.flatnonzero(curves[1:] == curves[:-1])  # knots at which an interval begins
+        interval_knots = np.flatnonzero(curves[1:] == curves[:-1])  # knots at which an interval begins
         number = np.cumsum(knot) - 1
-        begun = np.searchsorted(inner, number)  # intervals that begin before the point's knot
+        begun = np.searchsorted(interval_knots, number)  # intervals that begin before the point's knot
         # the last knot is in the last interval
-        interval = begun - (begun == np.searchsorted(inner, number, side="right"))
-        first = np.searchsorted(curves, curves[inner])
-        last = np.searchsorted(curves, curves[inner], side="right") - 1
-        neighbours = np.clip(inner + np.arange(-2, 4)[:, None], first, last)
-        control = np.arange(len(inner)) + 3 * curves[inner]
-        count = len(inner) + 3 * (int(curves[-1]) + 1)
+        interval = begun - (begun == np.searchsorted(interval_knots, number, side="right"))
+        first = np.searchsorted(curves, curves[interval_knots])
+        last = np.searchsorted(curves, curves[interval_knots], side="right") - 1
+        neighbours = np.clip(interval_knots + np.arange(-2, 4)[:, None], first, last)
+        control = np.arange(len(interval_knots)) + 3 * curves[interval_knots]
+        count = len(interval_knots) + 3 * (int(curves[-1]) + 1)
         return Layout(
             u=u,
             interval=interval,
-            begin=places[inner],
-            end=places[inner + 1],
+            begin=places[interval_knots],
+            end=places[interval_knots + 1],
             knots=places[neighbours],
             control=control,
-            curve=curves[inner],
+            curve=curves[interval_knots],
             count=count,
         )
 
@@ -106,11 +106,11 @@ def _add_ridge(layout: Layout, bands: Array) -> None:
     abscissae = np.stack([t[k : k + 3].mean(axis=0) for k in range(4)], axis=1)
     starts = np.append(True, layout.curve[1:] != layout.curve[:-1])
     for k in (0, 1):
-        used = starts if k == 0 else np.ones(len(starts), bool)
-        a, b = abscissae[used, k + 1] - abscissae[used, k], abscissae[used, k + 2] - abscissae[used, k + 1]
+        selected = starts if k == 0 else np.ones(len(starts), bool)
+        a, b = np.diff(abscissae[selected, k : k + 3], axis=1).T
         size = np.minimum(a, b)
         row = np.stack([size / a, -size / a - size / b, size / b], axis=1)
-        rows = layout.control[used] + k
+        rows = layout.control[selected] + k
         for i in range(3):
             for j in range(i, 3):
                 bands[j - i] += _BEND_WEIGHT * np.bincount(rows + i, row[:, i] * row[:, j], layout.count)
@@ -171,8 +171,8 @@ def _solve_block_tridiagonal(D: Array, U: Array, b: Array) -> Array:
     left, right = U[0::2], np.zeros((m, k, k))
     upper = U[1::2]
     right[: len(upper)] = upper
-    solved = np.linalg.solve(D[1::2], np.concatenate([left.swapaxes(1, 2), right, b[1::2]], axis=2))
-    a, c, d = solved[..., :k], solved[..., k : 2 * k], solved[..., 2 * k :]
+    solutions = np.linalg.solve(D[1::2], np.concatenate([left.swapaxes(1, 2), right, b[1::2]], axis=2))
+    a, c, d = solutions[..., :k], solutions[..., k : 2 * k], solutions[..., 2 * k :]
     D_kept, b_kept, count = D[0::2].copy(), b[0::2].copy(), len(upper)
     D_kept[:m] -= left @ a
     b_kept[:m] -= left @ d

@@ -62,16 +62,16 @@ def _distance_from(piece: Piece, corner: Array, s: float) -> float:
     return float(np.linalg.norm(piece.curve(np.array([s]))[0, : piece.task.position] - corner))
 
 
-def _length_at_radius(piece: Piece, corner: Array, radius: float, inner: float, outer: float) -> float:
+def _length_at_radius(piece: Piece, corner: Array, radius: float, near_end: float, far_end: float) -> float:
     """Length at which a piece is `radius` away from its corner, between the corner's length and the farthest."""
     if piece.rate:
-        return inner + math.copysign(radius / piece.rate, outer - inner)
+        return near_end + math.copysign(radius / piece.rate, far_end - near_end)
     for _ in range(6):  # each step divides the interval by 100
-        s = np.linspace(inner, outer, 101)
+        s = np.linspace(near_end, far_end, 101)
         distances = np.linalg.norm(piece.curve(s)[:, : piece.task.position] - corner, axis=1)
         interval = min(int(np.argmax(distances[1:] >= radius)), 99) if (distances[1:] >= radius).any() else 99
-        inner, outer = float(s[interval]), float(s[interval + 1])
-    return outer
+        near_end, far_end = float(s[interval]), float(s[interval + 1])
+    return far_end
 
 
 def _rotation_rate(w: Array, omega: Array) -> Array:

@@ -73,8 +73,9 @@ class Polyline:
         distinct = distinct_points(y)
         if len(distinct) == 1:  # no length at all, which the route reports
             return self._lines(spots, speeds)
-        back = 1 + np.flatnonzero(turn_angles(y[distinct]) > REVERSAL_ANGLE) if len(distinct) > 2 else np.zeros(0, int)
-        ends = np.concatenate([[0], back, [len(distinct) - 1]])
+        angles = turn_angles(y[distinct]) if len(distinct) > 2 else np.zeros(0)
+        reversals = 1 + np.flatnonzero(angles > REVERSAL_ANGLE)
+        ends = np.concatenate([[0], reversals, [len(distinct) - 1]])
         turns = bool(y[:, len(spots.positions[0]) + spots.sums.shape[1] :].any())
         pieces: list[Piece] = []
         for block in _point_blocks(ends, 1 if turns else _BLOCK_POINTS):
@@ -174,7 +175,7 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
         return [_line_between(task, spots, numbers, speeds)]
     curve, curve_at = _fit_moving(task, y, np.isin(np.arange(len(y)), ends), tolerance)
     piece, length = unit_speed_piece(task, spots.spot(numbers[0]), curve_at, curve.begin)
-    passed, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
+    lengths, bends, spans = length(curve.parameters), length(curve.bends), length(curve.begin)
     changes = _speed_changes(speeds)
     pieces = []
     for a, b in pairwise(ends.tolist()):
@@ -182,16 +183,16 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
             pieces.append(_line_between(task, spots, numbers[a : b + 1], speeds[a:b]))
             continue
         begins = a + np.flatnonzero(np.append(True, changes[a + 1 : b]))
-        low, high = passed[a], passed[b]
+        low, high = lengths[a], lengths[b]
         block_ends = [low - 1e-12, high + 1e-12]
         first_bend, last_bend = np.searchsorted(bends, block_ends).tolist()
         first_span, last_span = np.searchsorted(spans, block_ends).tolist()
         dense = Dense(
-            given=passed[a : b + 1] - low,
+            given=lengths[a : b + 1] - low,
             points=spots.positions[numbers[a : b + 1]],
             bends=bends[first_bend:last_bend] - low,
             spans=spans[first_span:last_span] - low,
-            begins=passed[begins] - low,
+            begins=lengths[begins] - low,
             speed=speeds[begins, 0],
             tool_speed=speeds[begins, 1],
         )
@@ -207,13 +208,13 @@ def _fit_moving(
 
     stop: (N,) where the path rests.
     """
-    moving = (y != y[0]).any(axis=0)
-    scale, constant = weights(task)[moving], np.where(moving, 0.0, y[0] / weights(task))
-    curve: FittedCurves = fit_curves(y[:, moving], FIT_SHARE * tolerance, stop)
+    is_varying = (y != y[0]).any(axis=0)
+    scale, constant = weights(task)[is_varying], np.where(is_varying, 0.0, y[0] / weights(task))
+    curve: FittedCurves = fit_curves(y[:, is_varying], FIT_SHARE * tolerance, stop)
 
     def curve_at(v: Array) -> tuple[Array, Array]:
         values, slopes = np.repeat(constant[:, None], len(v), axis=1), np.zeros((len(constant), len(v)))
-        values[moving], slopes[moving] = (component.T / scale[:, None] for component in curve.values(v))
+        values[is_varying], slopes[is_varying] = (component.T / scale[:, None] for component in curve.values(v))
         return values.T, slopes.T
 
     return curve, curve_at
@@ -221,8 +222,8 @@ def _fit_moving(
 
 def _speed_changes(speeds: Array) -> Bool:
     """Whether the speeds of each line (N,) differ from those of the line before; speeds: (N, 2), nan: none given."""
-    same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
-    return np.append(True, ~same.all(axis=1))
+    is_same = (speeds[1:] == speeds[:-1]) | (np.isnan(speeds[1:]) & np.isnan(speeds[:-1]))
+    return np.append(True, ~is_same.all(axis=1))
 
 
 def _curve_from(curve: Callable[[Array], Array], begin: float, s: Array) -> Array:

@@ -66,8 +66,8 @@ def corner_points(y: Array, tolerance: float, stop: Bool | None = None) -> Bool:
         following = np.searchsorted(ends, sharp, side="right")
         u_before = np.maximum(u[sharp] - np.maximum(distance * tolerance, length[sharp - 1]), u[ends[following - 1]])
         u_after = np.minimum(u[sharp] + np.maximum(distance * tolerance, length[sharp]), u[ends[following]])
-        before, after = _points_along(y, u, u_before), _points_along(y, u, u_after)
-        far_turns = turn_angles(np.stack([before, y[sharp], after], axis=1).reshape(-1, y.shape[1]))[::3]
+        points_before, points_after = _points_along(y, u, u_before), _points_along(y, u, u_after)
+        far_turns = turn_angles(np.stack([points_before, y[sharp], points_after], axis=1).reshape(-1, y.shape[1]))[::3]
         same_turn = (same_turn & (np.abs(far_turns - turns[sharp - 1]) < _SAME_TURN))[far_turns > CORNER_ANGLE]
         sharp, has_long_chords = sharp[far_turns > CORNER_ANGLE], has_long_chords[far_turns > CORNER_ANGLE]
     # with short chords, a turn that differs between near and far is a tight bend or noise, which a curve can pass
@@ -88,9 +88,9 @@ class _Cubics(NamedTuple):
     end: Array  # (M,)
     powers: Array  # (M, 4, d) coefficients over the fraction of each
 
-    def take(self, chosen: Bool | Int) -> _Cubics:
+    def take(self, selection: Bool | Int) -> _Cubics:
         """Some of the cubics."""
-        return _Cubics(self.begin[chosen], self.end[chosen], self.powers[chosen])
+        return _Cubics(self.begin[selection], self.end[selection], self.powers[selection])
 
     def chord(self, chords: Chords) -> Int:
         """The chord (M,) that the middle of each lies on."""
@@ -105,17 +105,17 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     y = np.asfortranarray(y)  # column order, fast for numpy
     chords = Chords(y, corner_points(y, tolerance, stop))
     stop = np.zeros(len(y), bool) if stop is None else stop
-    used, parts = np.ones(len(y) - 1, bool), []
+    is_used, parts = np.ones(len(y) - 1, bool), []
     for attempt in range(_MAX_TRIES + 1):
-        cubics, missed = _fit_cubics(chords, used, tolerance)
+        cubics, missed = _fit_cubics(chords, is_used, tolerance)
         # rounded chords replace cubics that miss points; in the last round they replace the whole curve
         retried = _chords_of_curves(chords, missed)
         final = ~retried[cubics.chord(chords)] | (attempt == _MAX_TRIES)
         parts.append(cubics.take(final))
         if not retried.any() or attempt == _MAX_TRIES:
             break
-        inner = np.concatenate([[False], retried[1:] & retried[:-1] & ~chords.corner[1:-1], [False]])
-        used, chords = retried, Chords(y, chords.corner | (missed if attempt + 1 < _MAX_TRIES else inner))
+        inner_points = np.concatenate([[False], retried[1:] & retried[:-1] & ~chords.corner[1:-1], [False]])
+        is_used, chords = retried, Chords(y, chords.corner | (missed if attempt + 1 < _MAX_TRIES else inner_points))
     every_cubic = _Cubics(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
     in_order = every_cubic.take(np.argsort(every_cubic.begin, kind="stable"))
     return _round_corners(chords, stop, in_order, tolerance)
@@ -128,15 +128,15 @@ def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
     return np.asarray(chosen_curves[chords.curve])
 
 
-def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[_Cubics, Bool]:
+def _fit_cubics(chords: Chords, is_used: Bool, tolerance: float) -> tuple[_Cubics, Bool]:
     """Fit the curves with used chords: begin, end (M,), powers (M, 4, d) of cubics; which points they miss (N,)."""
     curve, u, y = chords.curve, chords.u, chords.y
     missed = np.zeros(len(y), bool)
-    is_line = (np.bincount(curve)[curve] == 1) & used  # a straight line
+    is_line = (np.bincount(curve)[curve] == 1) & is_used  # a straight line
     line_powers = np.zeros((int(is_line.sum()), 4, y.shape[1]))
     line_powers[:, 0], line_powers[:, 1] = y[:-1][is_line], chords.step[is_line]
     begin, end, powers = u[:-1][is_line], u[1:][is_line], line_powers
-    is_curve = used & ~is_line
+    is_curve = is_used & ~is_line
     if is_curve.any():
         rows = FitRows.from_chords(chords, is_curve, tolerance)
         layout, control, misses = least_knots(rows)
@@ -156,9 +156,9 @@ def _fit_cubics(chords: Chords, used: Bool, tolerance: float) -> tuple[_Cubics, 
     return _Cubics(begin, end, powers), missed
 
 
-def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
+def _astray_points(chords: Chords, is_used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
     """Which inner points of the used curves lie farther from the cubics than the tolerance: (N,)."""
-    astray = np.concatenate([[False], used[1:] & used[:-1] & ~chords.corner[1:-1], [False]])
+    astray = np.concatenate([[False], is_used[1:] & is_used[:-1] & ~chords.corner[1:-1], [False]])
     number = np.flatnonzero(astray)
     y, parameters, min_square = chords.y[number], chords.u[number], np.full(len(number), np.inf)
     for _ in range(3):  # Newton steps to the nearest place
@@ -174,10 +174,10 @@ def _astray_points(chords: Chords, used: Bool, layout: Layout, cubics: Array, to
     return astray
 
 
-def _astray_chords(chords: Chords, used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:
+def _astray_chords(chords: Chords, is_used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:
     """Numbers of the chords that a cubic leaves between the places to which it was fitted."""
     f = (np.arange(_INNER_PLACES) + 0.5)[:, None] / _INNER_PLACES
-    k = np.flatnonzero(used)
+    k = np.flatnonzero(is_used)
     u = np.append(layout.begin + f * (layout.end - layout.begin), chords.u[k] + f * chords.length[k])
     i = np.searchsorted(layout.begin, u, side="right") - 1
     h = ((u - layout.begin[i]) / (layout.end[i] - layout.begin[i]))[:, None]

@@ -39,9 +39,9 @@ class FitRows:
     ends: Bool  # (R,) ends of curves
 
     @staticmethod
-    def from_chords(chords: Chords, used: Bool, tolerance: float) -> FitRows:
+    def from_chords(chords: Chords, is_used: Bool, tolerance: float) -> FitRows:
         """Rows of the chords that are used: (N - 1,)."""
-        numbers, share, row_weight = _places_on_chords(chords, used)
+        numbers, share, row_weight = _places_on_chords(chords, is_used)
         u = chords.u[numbers] + share * chords.length[numbers]
         order = np.lexsort((u, chords.curve[numbers]))
         is_new = np.append(True, np.diff(u[order]) > 1e-9) | np.append(True, np.diff(chords.curve[numbers][order]) > 0)
@@ -68,9 +68,9 @@ class FitRows:
 
     def part(self, curves: Int) -> FitRows:
         """All rows of some curves."""
-        taken = {field.name: getattr(self, field.name).T.take(curves, axis=-1).T for field in fields(self)}
-        taken["curve"] = np.unique(taken["curve"], return_inverse=True)[1]
-        return FitRows(**taken)
+        columns = {field.name: getattr(self, field.name).T.take(curves, axis=-1).T for field in fields(self)}
+        columns["curve"] = np.unique(columns["curve"], return_inverse=True)[1]
+        return FitRows(**columns)
 
     def miss(self, values: Array) -> Array:
         """The differences between curve points `values` (R, d) and the rows, across the curve or the chord: (R, d)."""
@@ -88,24 +88,25 @@ class FitRows:
         return np.asarray(miss - distance[:, None] * direction)
 
 
-def _places_on_chords(chords: Chords, used: Bool) -> tuple[Int, Array, Array]:
+def _places_on_chords(chords: Chords, is_used: Bool) -> tuple[Int, Array, Array]:
     """Chord number, fraction of the chord and weight of every row, in any order: (R,) each.
 
     The begin and the middle of each chord, the middle with weight 0, the ends of curves, and `_graded_places`.
     """
-    every, last = np.flatnonzero(used), np.flatnonzero(used & np.append(chords.curve[1:] != chords.curve[:-1], True))
-    graded, fractions = _graded_places(chords, used)
-    numbers = np.concatenate([every, every, last, graded])
-    sizes = [len(every), len(every), len(last)]
+    used_chords = np.flatnonzero(is_used)
+    last = np.flatnonzero(is_used & np.append(chords.curve[1:] != chords.curve[:-1], True))
+    graded_chords, fractions = _graded_places(chords, is_used)
+    numbers = np.concatenate([used_chords, used_chords, last, graded_chords])
+    sizes = [len(used_chords), len(used_chords), len(last)]
     share = np.append(np.repeat([0.0, 0.5, 1.0], sizes), fractions)
-    weight = np.append(np.repeat([1.0, 0.0, 1.0], sizes), np.ones(len(graded)))
+    weight = np.append(np.repeat([1.0, 0.0, 1.0], sizes), np.ones(len(graded_chords)))
     return numbers, share, weight
 
 
-def _graded_places(chords: Chords, used: Bool) -> tuple[Int, Array]:
+def _graded_places(chords: Chords, is_used: Bool) -> tuple[Int, Array]:
     """Additional places on chords with a much shorter neighbour, denser towards it: chord numbers and fractions."""
     L = chords.length
-    has_previous = np.append(False, (chords.curve[1:] == chords.curve[:-1])) & used
+    has_previous = np.append(False, (chords.curve[1:] == chords.curve[:-1])) & is_used
     has_next = np.append(has_previous[1:], False)
     left = np.where(has_previous, np.append(np.inf, L[:-1]), np.inf)
     right = np.where(has_next, np.append(L[1:], np.inf), np.inf)
@@ -164,16 +165,16 @@ class _Progress(NamedTuple):
         return _Progress(self.knot[index], self.weight[index], self.rounds[index])
 
 
-def _refine_intervals(rows: FitRows, layout: Layout, misses: Array, astray: Bool, progress: _Progress) -> None:
+def _refine_intervals(rows: FitRows, layout: Layout, misses: Array, is_astray: Bool, progress: _Progress) -> None:
     """Divide intervals that miss their rows, or raise the weights of those rows: changes `progress` in place."""
     (knot, weight, rounds), too_far = progress, misses > 1.0
-    worst = np.zeros(len(layout.begin))
-    np.maximum.at(worst, layout.interval[too_far], misses[too_far])
-    begins = np.searchsorted(layout.interval, np.arange(len(worst) + 1))
+    misfit = np.zeros(len(layout.begin))
+    np.maximum.at(misfit, layout.interval[too_far], misses[too_far])
+    begins = np.searchsorted(layout.interval, np.arange(len(misfit) + 1))
     knots = np.flatnonzero(knot)
     knots_before = knots[np.searchsorted(knots, begins[:-1])]
-    divide = astray | (worst > _HOPELESS_MISFIT) | ((worst > 1.0) & (rounds[knots_before] >= _WEIGHING_ROUNDS))
-    rounds[knots_before[worst > 1.0]] += 1
+    divide = is_astray | (misfit > _HOPELESS_MISFIT) | ((misfit > 1.0) & (rounds[knots_before] >= _WEIGHING_ROUNDS))
+    rounds[knots_before[misfit > 1.0]] += 1
     middle = (begins[:-1] + begins[1:]) // 2
     divided = divide & (middle > begins[:-1]) & ~knot[middle]
     knot[middle[divided]] = True
@@ -189,8 +190,8 @@ def _astray_intervals(rows: FitRows, layout: Layout, miss: Array, weight: Array)
     points = np.flatnonzero(rows.point >= 0)
     a, b = points[:-1], points[1:]
     interval = layout.interval[a]
-    inside = interval == layout.interval[b]
-    a, b, interval = a[inside], b[inside], interval[inside]
+    in_one_interval = interval == layout.interval[b]
+    a, b, interval = a[in_one_interval], b[in_one_interval], interval[in_one_interval]
     M = len(layout.begin)
     miss_a, miss_b = (miss.T.take(side, axis=1) for side in (a, b))
     products = np.bincount(interval, (miss_a * miss_b).sum(axis=0), M)

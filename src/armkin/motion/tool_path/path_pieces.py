@@ -183,19 +183,20 @@ def unit_speed_piece(
     y, left = curve(grid)
     right = curve(grid[1:] - 1e-9 * step)[1]  # a corner has two directions
     left, right = (d / np.maximum(np.linalg.norm(d * scale, axis=1), 1e-12)[:, None] for d in (left[:-1], right))
-    moving = np.flatnonzero((y != y[0]).any(axis=0))
+    components = np.flatnonzero((y != y[0]).any(axis=0))
     h, constant = np.diff(s), y[0]
-    y0, d0, d1 = y[:-1, moving], left[:, moving] * h[:, None], right[:, moving] * h[:, None]  # left, right: dy/ds
-    chord = y[1:, moving] - y0
+    y0, d0, d1 = y[:-1, components], left[:, components], right[:, components]
+    d0, d1 = d0 * h[:, None], d1 * h[:, None]  # left, right: dy/ds
+    chord = y[1:, components] - y0
     powers = np.stack([y0.T, d0.T, (3 * chord - 2 * d0 - d1).T, (d0 + d1 - 2 * chord).T])  # (4, d, intervals)
-    inner = s[1:-1]
+    inner_lengths = s[1:-1]
 
     def curve_by_length(x: Array) -> Array:
-        i = inner.searchsorted(x, side="right")
+        i = inner_lengths.searchsorted(x, side="right")
         f = (x - s.take(i)) / h.take(i)
         c0, c1, c2, c3 = powers.take(i, axis=2)
         y_at = np.repeat(constant[:, None], len(x), axis=1)
-        y_at[moving] = c0 + f * (c1 + f * (c2 + f * c3))
+        y_at[components] = c0 + f * (c1 + f * (c2 + f * c3))
         return y_at.T
 
     return Piece(task, first, curve_by_length, float(s[-1])), lambda v: np.interp(v, grid, s)
