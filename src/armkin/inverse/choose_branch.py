@@ -332,16 +332,10 @@ class _SweptTarget:
             missed = math.hypot(row.residual_mm / request.arm.reach, math.radians(row.residual_deg))
             status = (Status.EXACT if missed <= tol.SOLUTION else Status.POSITION).name.lower()
         return first._replace(
-            status=status,
-            complete=first.complete and not request.swept,
-            free=sorted(self.free),
-            branches=[branch for branch, _ in ranked],
-            best=best,
-            refused=refused,
-            total=self.total,
-            within_limits=self.legal,
-            names=tuple(self.names),
-        )
+            status=status, complete=first.complete and not request.swept, free=sorted(self.free),
+            branches=[branch for branch, _ in ranked], best=best, refused=refused,
+            total=self.total, within_limits=self.legal, names=tuple(self.names),
+        )  # fmt: skip
 
 
 def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:

@@ -115,8 +115,7 @@ def solve_by(
     """`ik` by a given solver, for an arm with ratios of 1; single: whether the targets were given in float32."""
     targets, batch_shape = flat_targets(task, values)
     reference = read_near(arm, near, batch_shape)
-    is_shared = reference.ndim == 1 and len(targets) != 1
-    nears = np.broadcast_to(reference, (len(targets), arm.n)) if is_shared else reference.reshape(-1, arm.n)
+    nears = np.broadcast_to(reference.reshape(-1, arm.n), (len(targets), arm.n))
     common = reference if reference.ndim == 1 else None
     if geometry.pairs:
         solved = chunks.solve_closed_form(Goals(arm, task, targets, nears), geometry, common, examine, workers)

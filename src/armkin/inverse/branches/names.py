@@ -1,8 +1,7 @@
 """Names of branches: left or right, elbow up or down, wrist flipped or not.
 
-A branch of a closed form is one choice of sign on each branch axis. Along a path of targets
-it keeps its signs, and so its name, until it merges with its neighbour. Sample postures show
-once for each arm which sign has which name:
+A branch of a closed form is one choice of sign on each branch axis. Along a path of targets it keeps its signs, and so
+its name, until it merges with its neighbour. Sample postures show once for each arm which sign has which name:
 
 - left: the shoulder on whose side the arm's home posture lies (it reaches to the front),
   right: reaching over its back;

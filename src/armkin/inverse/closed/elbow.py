@@ -1,8 +1,7 @@
 """One joint, then two parallel revolute joints: the arm under most wrists, in closed form.
 
-The tip's distance along the parallel axes is the same for all angles of the two parallel
-joints, which gives the first joint; what remains is a planar two-link arm (Siciliano et
-al., Robotics, 2.12.2 and 2.12.4).
+The tip's distance along the parallel axes is the same for all angles of the two parallel joints, which gives the first
+joint; what remains is a planar two-link arm (Siciliano et al., Robotics, 2.12.2 and 2.12.4).
 """
 
 import numpy as np

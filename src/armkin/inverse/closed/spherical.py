@@ -1,8 +1,7 @@
 """Spherical wrists and shoulders: three joint axes that meet in one point at an end of the arm.
 
-The three joints do not move that point: the other three place it (`Elbow` or `Position`), and
-the three turn the tool (Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose first
-three axes meet is solved as the reversed chain.
+The three joints do not move that point: the other three place it (`Elbow` or `Position`), and the three turn the tool
+(Pieper 1968; Siciliano et al., Robotics, 2.12.5). An arm whose first three axes meet is solved as the reversed chain.
 """
 
 from collections.abc import Callable

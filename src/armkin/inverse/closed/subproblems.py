@@ -3,9 +3,8 @@
 Angles are pairs of cosine and sine until the end: the algebra gives the pairs without inverse
 functions, and they are enough to compute the residual of a branch.
 
-The solutions of a subproblem are on branch axes of their own in front of the batch axis, as in
-shape (2, 2, 1, N), and broadcast against quantities that do not depend on them. The argument
-`axis` chooses the axis (`signs`).
+The solutions of a subproblem are on branch axes of their own in front of the batch axis, as in shape (2, 2, 1, N), and
+broadcast against quantities that do not depend on them. The argument `axis` chooses the axis (`signs`).
 """
 
 from collections.abc import Callable, Iterator, Sequence

@@ -1,10 +1,9 @@
 """Six revolute joints, axes 2, 3 and 4 parallel, axes 5 and 6 meeting: the UR arms and their kin.
 
-Joints 2, 3 and 4 do not change the distance along their common direction n, nor the angle
-between n and axis 6. The distance gives joint 1, the angle joint 5; joint 6 follows from n in
-the tool's frame, and the rest is a planar arm of three joints with a known direction (Hawkins,
-Analytic Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms, 2013, here for any
-convention). The reversed chain covers axes 3, 4 and 5.
+Joints 2, 3 and 4 do not change the distance along their common direction n, nor the angle between n and axis 6. The
+distance gives joint 1, the angle joint 5; joint 6 follows from n in the tool's frame, and the rest is a planar arm of
+three joints with a known direction (Hawkins, Analytic Inverse Kinematics for the Universal Robots UR-5/UR-10 Arms,
+2013, here for any convention). The reversed chain covers axes 3, 4 and 5.
 """
 
 from collections.abc import Sequence

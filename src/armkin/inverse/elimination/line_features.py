@@ -4,9 +4,8 @@ For a point ``p`` and a unit direction ``l`` of a line let
 
     f(p, l) = [p, l, p.p, p.l, p x l, (p.p) l - 2 (p.l) p, 1].
 
-The first fourteen are the functions whose equations Raghavan and Roth (1990, "Kinematic analysis of
-the 6R manipulator of general geometry") equate; with the constant they span a space that rigid
-motions map to itself:
+The first fourteen are the functions whose equations Raghavan and Roth (1990, "Kinematic analysis of the 6R manipulator
+of general geometry") equate; with the constant they span a space that rigid motions map to itself:
 
     f(R p + t, R l) = Rep(R, t) f(p, l),     Rep(X Y) = Rep(X) Rep(Y),
 

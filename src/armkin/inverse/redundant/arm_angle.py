@@ -221,6 +221,7 @@ class Turning(NamedTuple):
     near: Array  # (N, n)
     pieces: Pieces
     short: Bool
+    complete: Bool  # (N,) whether no curve of a target can be missing
     steps: int = STEPS
 
     @classmethod
@@ -228,13 +229,8 @@ class Turning(NamedTuple):
         """The curves of targets, near (N, n)."""
         circles = _circles(srs, target)
         pieces = _pieces(srs, circles, near[circles.row]) if len(circles.row) else none(srs.arm.n)
-        curves = cls(srs, circles, near, pieces, np.zeros(len(target), bool))
+        curves = cls(srs, circles, near, pieces, np.zeros(len(target), bool), circles.complete)
         return curves._replace(pieces=pieces._replace(start=curves.at(pieces, pieces.at)[0]))
-
-    @property
-    def complete(self) -> Bool:
-        """(N,) whether no curve of a target can be missing."""
-        return self.circles.complete
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """A posture (P, n) on each piece, at its legal copy nearest to near, and whether it is legal."""

@@ -114,18 +114,12 @@ def _with_tool_turn(
     interval = np.full((*s.valid.shape, 2), np.nan)
     interval[s.valid] = [-np.pi, np.pi] if turns else [arm.lower[r], arm.upper[r]]
     method, why, _ = method_of_families(arm, redundant)
+    q, free = np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1), np.insert(s.free, r, False, axis=-1)
+    status = np.where(s.status == Status.BOUNDARY, np.int8(Status.EXACT), s.status)  # a family moves the joint
     return replace(
-        s,
-        arm=arm,
-        task=redundant.task,
-        near=reference,
-        q=np.insert(s.q, r, np.where(s.valid, value, np.nan), axis=-1),
-        status=np.where(s.status == Status.BOUNDARY, np.int8(Status.EXACT), s.status),  # a family moves the joint
-        free=np.insert(s.free, r, False, axis=-1),
-        method=method,
-        why=why,
-        interval=interval,
-    )
+        s, arm=arm, task=redundant.task, near=reference, method=method, why=why,
+        q=q, free=free, status=status, interval=interval,
+    )  # fmt: skip
 
 
 def method_of_families(arm: Arm, redundant: Redundancy) -> tuple[str, str, bool]:

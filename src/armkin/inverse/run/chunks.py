@@ -100,8 +100,7 @@ def _write_chunk(
     goals: Goals, shape: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, at_tip: Int
 ) -> Doubted:
     """Write a chunk's branches, of a shape (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
-    targets on an edge. at_tip: the result of `near_itself.at_tip`, empty without examination.
-    """
+    targets on an edge. at_tip: the result of `near_itself.at_tip`, empty without examination."""
     *values, miss, doubt, _ = outputs
     miss = np.broadcast_to(miss, shape)
     valid = (miss <= tol.ACCEPTED**2).reshape(-1, shape[-1])

@@ -118,17 +118,13 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     is_plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
     is_plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False
     is_wrong = is_plain & (miss > tol.NEARBY**2)
+    tight = np.where(is_wrong[:, :, None], np.nan, tight)
+    ends, narrow = np.zeros((2, len(rows)), bool)
     doubts = _Doubts(
-        rows=rows,
-        tight=np.where(is_wrong[:, :, None], np.nan, tight),
-        first=np.where(is_wrong[:, :, None], np.nan, tight),
-        second=np.full(tight.shape, np.nan),
-        loose=np.zeros(tight.shape[:2], bool),
-        free=np.asarray((free > 0.0).any(axis=1)),
-        ends=np.zeros(len(rows), bool),
-        narrow=np.zeros(len(rows), bool),
+        rows=rows, tight=tight, first=tight.copy(), second=np.full(tight.shape, np.nan), ends=ends, narrow=narrow,
+        loose=np.zeros(tight.shape[:2], bool), free=np.asarray((free > 0.0).any(axis=1)),
         simple=is_plain & (miss <= tol.ACCEPTED**2),
-    )
+    )  # fmt: skip
     part = np.flatnonzero(doubts.free)
     if len(part):
         goal, reference = target[part], near[part]

@@ -156,16 +156,8 @@ class OneTarget:
         end = 3 * B + n
         solutions = Solutions.__new__(Solutions)  # faster than the constructor of a frozen class
         solutions.__dict__.update(
-            self._same,
-            target=target,
-            near=near.copy(),
-            q=q,
-            valid=flags[:B],
-            within_limits=flags[B : 2 * B],
-            branch=block[2 * B : 3 * B],
-            free=flags[3 * B : end],
-            status=block[end : end + 1].reshape(()),
-            complete=flags[end + 1 :].reshape(()),
-            rounding=np.array(defect),
-        )
+            self._same, target=target, near=near.copy(), rounding=np.array(defect), q=q,
+            valid=flags[:B], within_limits=flags[B : 2 * B], branch=block[2 * B : 3 * B], free=flags[3 * B : end],
+            status=block[end : end + 1].reshape(()), complete=flags[end + 1 :].reshape(()),
+        )  # fmt: skip
         return solutions

@@ -79,8 +79,7 @@ def _may_be_legal(goals: Goals, batch: Batch, rows: Int) -> Bool:
 
 def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     """The branches; of singular targets each that hits something or is outside limits, at the nearest posture of
-    its self-motion that is neither, if there is one to 0.1 degrees.
-    """
+    its self-motion that is neither, if there is one to 0.1 degrees."""
     arm, task, target, near = goals
     is_free = hits_nothing(arm, batch.q) & batch.within
     for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~is_free):

@@ -1,15 +1,13 @@
 """Arms that miss a class by a little: rounded tables, calibrated axes, links that were meant to be zero.
 
-The closed form of the class that such an arm almost belongs to gives seeds, which Newton's
-method moves onto the true arm. Branches continue each other as long as no singularity lies
-between the two arms: where those of the similar arm move too much, appear or vanish as the
-target is moved by a few times the distance between the arms, the pose is in doubt. Six joints
-then go to the elimination, which needs no special class; of three turning joints all roots are
-eigenvalues (`position_pencil`). Of others both branches of a fold are found at once (`pairs`), and where
-that fails, the similar arm's branches at the targets around give more seeds: there is no proof that nothing is lost in
-between, hence `complete` is False. Where the
-elimination is healthy on the arm, as the share of poses that its first two passes settle shows,
-six joints go straight to it, and the similar arm only names the branches.
+The closed form of the class that such an arm almost belongs to gives seeds, which Newton's method moves onto the true
+arm. Branches continue each other as long as no singularity lies between the two arms: where those of the similar arm
+move too much, appear or vanish as the target is moved by a few times the distance between the arms, the pose is in
+doubt. Six joints then go to the elimination, which needs no special class; of three turning joints all roots are
+eigenvalues (`position_pencil`). Of others both branches of a fold are found at once (`pairs`), and where that fails,
+the similar arm's branches at the targets around give more seeds: there is no proof that nothing is lost in between,
+hence `complete` is False. Where the elimination is healthy on the arm, as the share of poses that its first two passes
+settle shows, six joints go straight to it, and the similar arm only names the branches.
 """
 
 from collections.abc import Callable
