@@ -256,10 +256,12 @@ TO_LAST = _FIT[-2:]
 
 def _evaluate(coefficients: Array, s: Array) -> Array:
     """Polynomials (NODES, M, k) at s (..., M): (..., M, k)."""
-    powers = np.empty((*s.shape, len(coefficients)))
-    powers[..., 0], powers[..., 1:] = 1.0, s[..., None]
-    powers = np.multiply.accumulate(powers, axis=-1)
-    return np.asarray((powers[..., None, :] @ coefficients.swapaxes(0, 1))[..., 0, :])
+    powers = np.ones((len(coefficients), *s.shape))
+    for k in range(1, len(powers)):
+        np.multiply(powers[k - 1], s, out=powers[k])
+    weights = powers.reshape(len(powers), -1, s.shape[-1]).transpose(2, 1, 0)  # (M, points, NODES)
+    values = (weights @ coefficients.swapaxes(0, 1)).swapaxes(0, 1)
+    return np.asarray(values.reshape(*s.shape, coefficients.shape[2]))
 
 
 def _combine_nodes(weights: Any, values: Array) -> Array:
