@@ -128,8 +128,8 @@ def _check_truth(emulated: Emulated) -> str:
 
 def _wait_for_rest(emulated: Emulated) -> None:
     """Wait until no motor moves."""
-    end, last_counts = emulated.line.now() + PATIENCE, list[int]()
-    while last_counts != (counts := _pin_counts(emulated)) and emulated.line.now() < end:
+    deadline, last_counts = emulated.line.now() + PATIENCE, list[int]()
+    while last_counts != (counts := _pin_counts(emulated)) and emulated.line.now() < deadline:
         last_counts = counts
         wait_end = emulated.line.now() + 1.0
         while emulated.line.now() < wait_end:

@@ -106,8 +106,8 @@ def _similar_options(error: Any, context: Any) -> list[str]:
         for name in (*param.opts, *param.secondary_opts)
         if name.startswith("--")
     ]
-    begun = [name for name in option_names if len(word) > 3 and name.startswith(f"{word}-")]
-    return list(getattr(error, "possibilities", None) or begun)
+    same_beginning = [name for name in option_names if len(word) > 3 and name.startswith(f"{word}-")]
+    return list(getattr(error, "possibilities", None) or same_beginning)
 
 
 def _unexpected_code(error: BaseException) -> int:

@@ -109,9 +109,9 @@ def _poll_windows(seconds: float) -> str:
         return ""
     import msvcrt
 
-    end = time.monotonic() + seconds
+    deadline = time.monotonic() + seconds
     while not msvcrt.kbhit():
-        if time.monotonic() >= end:
+        if time.monotonic() >= deadline:
             return ""
         time.sleep(0.002)
     read = msvcrt.getwch()

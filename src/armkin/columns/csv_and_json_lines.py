@@ -111,6 +111,8 @@ def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing_
 
 def _needs_python_digits(values: NDArray[np.floating]) -> NDArray[np.bool_]:
     """Where pyarrow's digits are not laid out as Python's: 1 for 1.0, 1e-7 for 1e-07, 1e+10 for 10000000000.0, nan."""
-    size = np.abs(values)
-    is_plain = (values != np.rint(values)) & (((size >= 1e-3) & (size < 1e9)) | ((size < 1e-10) & (size > 1e-99)))
+    magnitudes = np.abs(values)
+    is_plain = (values != np.rint(values)) & (
+        ((magnitudes >= 1e-3) & (magnitudes < 1e9)) | ((magnitudes < 1e-10) & (magnitudes > 1e-99))
+    )
     return np.asarray(~is_plain)

@@ -32,17 +32,17 @@ def column_places(heading: Sequence[str], name: str) -> list[int]:
 
 def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
     """The file's names of the columns wanted."""
-    lower = [cell.lower() for cell in heading]
-    places_of = {name: column_places(lower, name.lower()) for name in names}
+    lower_heading = [cell.lower() for cell in heading]
+    places_of = {name: column_places(lower_heading, name.lower()) for name in names}
     missing_names = [name for name, places_found in places_of.items() if not places_found]
     if missing_names:
         heading_text = ", ".join(heading[:20])
         raise UsageError(
             f"{path} has no column{'s' * (len(missing_names) > 1)} {', '.join(missing_names)}; it has {heading_text}"
         )
-    double = [name for name, places_found in places_of.items() if len(places_found) > 1]
-    if double:
-        raise UsageError(f"{path} has two columns {double[0]}")
+    doubled_names = [name for name, places_found in places_of.items() if len(places_found) > 1]
+    if doubled_names:
+        raise UsageError(f"{path} has two columns {doubled_names[0]}")
     return [heading[places_found[0]] for places_found in places_of.values()]
 
 

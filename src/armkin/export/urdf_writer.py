@@ -123,8 +123,8 @@ def _body_lines(corners: Array, radius: float) -> list[list[str]]:
 
 def _hub_lines(offset: float, radius: float) -> list[str]:
     """A short cylinder for a joint, at an offset [mm] along its axis."""
-    size = f'<cylinder radius="{_metres_text(radius)}" length="{_metres_text(2.2 * radius)}"/>'
-    return _visual_lines("joint", f'<origin xyz="0 0 {_metres_text(offset)}" rpy="0 0 0"/>', size)
+    cylinder = f'<cylinder radius="{_metres_text(radius)}" length="{_metres_text(2.2 * radius)}"/>'
+    return _visual_lines("joint", f'<origin xyz="0 0 {_metres_text(offset)}" rpy="0 0 0"/>', cylinder)
 
 
 def _piece_lines(start: Array, end: Array, radius: float) -> list[str]:

@@ -35,8 +35,8 @@ def mounted_drives() -> Iterator[Path]:
 
 def wait_for_drive(seconds: float = _APPEARS) -> Path:
     """The boot drive, once it is mounted. Raises LinkError if none is within `seconds`, or several are."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+    deadline = time.monotonic() + seconds
+    while time.monotonic() < deadline:
         drives = list(mounted_drives())
         if len(drives) == 1:
             return drives[0]

@@ -59,7 +59,7 @@ class Stk500v1:
         return answer[1:-1]
 
     def _take(self, count: int, timeout: float) -> bytes:
-        end, received = time.monotonic() + timeout, b""
-        while len(received) < count and (left := end - time.monotonic()) > 0:
+        deadline, received = time.monotonic() + timeout, b""
+        while len(received) < count and (left := deadline - time.monotonic()) > 0:
             received += self._port.read(left)
         return received

@@ -63,8 +63,8 @@ class Stk500v2:
         self._number = (self._number + 1) & 255
         message = bytes([_START, self._number, *len(body).to_bytes(2, "big"), _TOKEN]) + body
         self._port.write(message + bytes([reduce(xor, message)]))
-        end, reply = time.monotonic() + timeout, b""
-        while (left := end - time.monotonic()) > 0:
+        deadline, reply = time.monotonic() + timeout, b""
+        while (left := deadline - time.monotonic()) > 0:
             reply += self._port.read(left)
             reply = reply[max(reply.find(bytes([_START, self._number])), 0) :]  # what a program has said before
             size = 6 + int.from_bytes(reply[2:4], "big")

@@ -145,8 +145,8 @@ def _to_boot_drive(image: Image, port: str, tick: Tick) -> FlashResult:
     before = {port_info.device for port_info in list_ports()}
     boot_drive.copy_image(folder, image.path.name, image.data)
     tick(len(image.data), len(image.data))
-    end = time.monotonic() + _RESTART
-    while time.monotonic() < end:
+    deadline = time.monotonic() + _RESTART
+    while time.monotonic() < deadline:
         ports = [
             port_info.device for port_info in list_ports() if port_info.device == port or port_info.device not in before
         ]

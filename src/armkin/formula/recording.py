@@ -178,8 +178,8 @@ def branch_signs(x: Any, zeros: bool = False) -> bool:
     """Whether a node is a value times an array of signs on branch axes; zeros: whether zeros count as signs."""
     if not isinstance(x, Node) or x.op != "multiply" or not _ndim(x.args[0]):
         return False
-    size = np.abs(x.args[0])
-    return bool(((size == 1.0) | (zeros & (size == 0.0))).all())
+    magnitudes = np.abs(x.args[0])
+    return bool(((magnitudes == 1.0) | (zeros & (magnitudes == 0.0))).all())
 
 
 def _split_sign(x: Any) -> tuple[Sign, Any]:

@@ -123,15 +123,15 @@ def _elements(element: _Element) -> Iterator[_Element]:
 def _drawing_frame(root: _Element) -> Matrix:
     """From the drawing's coordinates to millimetres, x right and y up from the viewBox's lower left corner."""
     attributes = {key: text for key, text in root.attributes.items() if not text.strip().endswith("%")}
-    size = above_zero(attributes, "width", "height")
-    if 0.0 in size:
+    lengths = above_zero(attributes, "width", "height")
+    if 0.0 in lengths:
         raise ShapeError("width and height are above 0, or left out")
     box = parse_numbers(root.attributes.get("viewBox", ""))
     if box and (len(box) != 4 or box[2] <= 0 or box[3] <= 0):
         raise ShapeError("viewBox needs x y width height, the last two above 0")
     if not box:
-        return _MM, 0.0, 0.0, -_MM, 0.0, (size[1] or 0.0) * _MM
-    sx, sy = _scales(size, box[2:], root.attributes.get("preserveAspectRatio", ""))
+        return _MM, 0.0, 0.0, -_MM, 0.0, (lengths[1] or 0.0) * _MM
+    sx, sy = _scales(lengths, box[2:], root.attributes.get("preserveAspectRatio", ""))
     return sx * _MM, 0.0, 0.0, -sy * _MM, -box[0] * sx * _MM, (box[1] + box[3]) * sy * _MM
 
 

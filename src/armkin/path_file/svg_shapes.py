@@ -246,8 +246,8 @@ def _draw_path(pen: _Outline, data: str) -> None:
             return
         if data[index].isalpha():
             command, index = data[index], index + 1
-            begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or data.lstrip()[0] in "Mm"
-            if command.upper() not in _COMMANDS or not begun:
+            has_begun = pen.strokes or command.upper() == "M" or pen.position != (0, 0) or data.lstrip()[0] in "Mm"
+            if command.upper() not in _COMMANDS or not has_begun:
                 raise ShapeError(f"path data: '{command}' is not known here; it begins with M")
             if command in "Zz":
                 pen.close()

@@ -81,8 +81,8 @@ def _similar_names(robot: str) -> list[str]:
         matches = get_close_matches(_comparable_name(base), choice_of, n=1, cutoff=cutoff)
         if matches:
             return [os.path.join(parent, choice_of[matches[0]])]
-    begun = [name for name in robot_names() if len(stem) > 1 and name.startswith(_comparable_name(base))]
-    return begun[:4]
+    same_beginning = [name for name in robot_names() if len(stem) > 1 and name.startswith(_comparable_name(base))]
+    return same_beginning[:4]
 
 
 def _comparable_name(name: str) -> str:

@@ -22,14 +22,14 @@ def with_values(text: str, values: Mapping[Path, float | int | str]) -> str:
     for path, value in values.items():
         mapping = _node_at(root, path[:-1])
         value_node = next((node for key, node in mapping.value if key.value == path[-1]), None)
-        last = mapping.value[-1][1].end_mark.index
+        end_index = mapping.value[-1][1].end_mark.index
         if value_node is not None:
             edits.append((value_node.start_mark.index, value_node.end_mark.index, str(value)))
         elif mapping.flow_style:
-            edits.append((last, last, f", {path[-1]}: {value}"))
+            edits.append((end_index, end_index, f", {path[-1]}: {value}"))
         else:
             column = mapping.value[0][0].start_mark.column
-            end = last if text[:last].endswith("\n") else text.find("\n", last) + 1 or len(text)
+            end = end_index if text[:end_index].endswith("\n") else text.find("\n", end_index) + 1 or len(text)
             edits.append((end, end, f"{' ' * column}{path[-1]}: {value}\n"))
     for begin, end, replacement in sorted(edits, reverse=True):
         text = text[:begin] + replacement + text[end:]

@@ -80,10 +80,10 @@ def parse_urdf(
     if len(raw) > MAX_BYTES:
         raise RobotFileError(f"{name}: larger than {MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes")
     robot, tree = parse_document(raw, name)
-    first = tree.base(base)
-    chain = tree.chain(first, tree.tip(first, tip))
-    robot_read = _chain_as_robot(name, robot, chain, first, tip or (chain[-1].parts["child"]["link"]), snap)
-    _note_bodies(robot_read.data, tree, first, [joint for joint in chain if joint.kind != "fixed"])
+    base_link = tree.base(base)
+    chain = tree.chain(base_link, tree.tip(base_link, tip))
+    robot_read = _chain_as_robot(name, robot, chain, base_link, tip or (chain[-1].parts["child"]["link"]), snap)
+    _note_bodies(robot_read.data, tree, base_link, [joint for joint in chain if joint.kind != "fixed"])
     return robot_read
 
 

@@ -67,11 +67,11 @@ def _body_triangles(arm: Arm, path: str) -> list[Array]:
             f"{path}: larger than {urdf_reader.MAX_BYTES // 2**20} MB; a URDF without its meshes has kilobytes"
         )
     _, tree = parse_document(raw, path)
-    first = tree.base(None)
+    base_link = tree.base(None)
     joint_frames = _joint_frames(arm)
-    chain = _matching_joints(arm, tree, first, joint_frames)
+    chain = _matching_joints(arm, tree, base_link, joint_frames)
     triangles_of: list[list[Array]] = [[np.zeros((0, 3, 3))] for _ in range(arm.n + 1)]
-    stack = [(first, np.eye(4), 0)]
+    stack = [(base_link, np.eye(4), 0)]
     files = 0
     while stack:
         link, T, body = stack.pop()

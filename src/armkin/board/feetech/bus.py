@@ -92,8 +92,8 @@ class Bus:
                 pass  # discard late answers to an earlier request
             self.port.write(question)
             # wait longer in later tries, for a busy computer
-            end = self.port.now() + (_ANSWER_TIMEOUT + 0.002 * len(servos)) * (1 + attempt // 2)
-            while len(answers) < len(servos) and self.port.now() < end:
+            deadline = self.port.now() + (_ANSWER_TIMEOUT + 0.002 * len(servos)) * (1 + attempt // 2)
+            while len(answers) < len(servos) and self.port.now() < deadline:
                 for answer in self._splitter.feed(self.port.read(0.002)):
                     self._take_answer(answer, servos, size, answers)
             if len(answers) == len(servos):

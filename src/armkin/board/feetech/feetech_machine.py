@@ -56,9 +56,9 @@ class ServoMachine(ServoArm):
         limit_bytes = self.bus.read_all(self.ids, *registers.LIMITS)
         limits = []
         for number in self.ids:
-            lower = self._limit_value(registers.MIN_POSITION, limit_bytes[number])
+            lower_limit = self._limit_value(registers.MIN_POSITION, limit_bytes[number])
             upper = self._limit_value(registers.MAX_POSITION, limit_bytes[number])
-            limits.append([lower, upper] if lower or upper else [-_MAX_COUNTS, _MAX_COUNTS])  # both 0: none
+            limits.append([lower_limit, upper] if lower_limit or upper else [-_MAX_COUNTS, _MAX_COUNTS])  # both 0: none
         return np.array(limits, dtype=np.int64)
 
     @staticmethod

@@ -155,11 +155,11 @@ class GrblMachine(StepperArm):
     def hold(self) -> None:
         """Stop along the path and clear the queue; the position stays known."""
         self.session.realtime(replies.HOLD)
-        end = self.port.now() + _HOLD_TIMEOUT
+        deadline = self.port.now() + _HOLD_TIMEOUT
         while (status := self.session.status()).state not in ("Idle", "Alarm") and (
             status.state != "Hold" or status.detail
         ):
-            if self.port.now() > end:
+            if self.port.now() > deadline:
                 raise LinkError(f"GRBL does not come to rest: it says {status.state}; cut the motors' power")
             self.port.read(0.02)
         alarm = self.session.sure_status().state == "Alarm"

@@ -76,8 +76,8 @@ class Session:
 
     def wake(self) -> Report:
         """The first status report. Raises LinkError if none arrives."""
-        end = self.port.now() + _BOOT_TIMEOUT
-        while self.port.now() < end:
+        deadline = self.port.now() + _BOOT_TIMEOUT
+        while self.port.now() < deadline:
             self.port.write(replies.STATUS)
             with suppress(GrblError):  # ignore errors of another program's line, or of a new board's memory
                 self._wait(lambda: self.report is not None, 0.25)
@@ -236,9 +236,9 @@ class Session:
         self.port.write(raw)
 
     def _wait(self, finished: Callable[[], bool], seconds: float) -> bool:
-        end = self.port.now() + seconds
+        deadline = self.port.now() + seconds
         while not finished():
-            if self.port.now() >= end:
+            if self.port.now() >= deadline:
                 return False
             self._pump(0.01)
         return True

@@ -32,9 +32,9 @@ class Api:
     def ask(self, method: str, params: dict[str, Any] | None = None, patience: float = _TIMEOUT) -> dict[str, Any]:
         """A request and its result. Raises KlipperError if it is refused, LinkError if nothing comes."""
         number = self.send(method, params)
-        end = self._port.now() + patience
+        deadline = self._port.now() + patience
         while number in self._waiting:
-            if self._port.now() > end:
+            if self._port.now() > deadline:
                 self._waiting.discard(number)
                 raise LinkError(f"Klipper on {self._port.name} did not answer {method} within {patience:g} s")
             self.pump(0.02)

@@ -48,10 +48,10 @@ class SerialPort:
 
     def read(self, timeout: float) -> bytes:
         """The bytes that have arrived, or arrive within `timeout` seconds."""
-        end = time.monotonic() + timeout
+        deadline = time.monotonic() + timeout
         while True:
             received: bytes = self._guard(self._read_some)
-            if received or time.monotonic() >= end:
+            if received or time.monotonic() >= deadline:
                 return received
 
     def _read_some(self) -> bytes:

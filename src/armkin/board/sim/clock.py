@@ -19,11 +19,11 @@ class SimulatedTime(ABC):
 
     def read(self, timeout: float) -> bytes:
         """The answers since the last call; simulated time passes while there are none."""
-        end = self._now + timeout
-        while not self._out and self._now < end:
+        deadline = self._now + timeout
+        while not self._out and self._now < deadline:
             self.advance(self.step)
-        answered, self._out = bytes(self._out), bytearray()
-        return answered
+        answers, self._out = bytes(self._out), bytearray()
+        return answers
 
     def now(self) -> float:
         """Simulated seconds."""

@@ -61,10 +61,10 @@ class Velocity:
 
     def copy(self) -> Velocity:
         """A copy of these velocities, to go on from."""
-        twin = Velocity(self.board, self.image)
-        twin._last_ends, twin._excess = list(self._last_ends), list(self._excess)
-        twin._last_pace, twin._pace = self._last_pace, self._pace
-        return twin
+        copied = Velocity(self.board, self.image)
+        copied._last_ends, copied._excess = list(self._last_ends), list(self._excess)
+        copied._last_pace, copied._pace = self._last_pace, self._pace
+        return copied
 
     def begin(self, segment: Segment) -> None:
         """Begin a segment whose intervals have been checked."""

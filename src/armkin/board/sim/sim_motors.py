@@ -113,10 +113,10 @@ class Motors:
                 self._run(seconds * min(1.0, self._hold / plan if plan else 1.0))
 
     def _run(self, seconds: float) -> None:
-        last = self.queue.run(seconds)
-        if last is None:
+        finished = self.queue.run(seconds)
+        if finished is None:
             return
-        if not last.end and self.state == State.MOVING:
+        if not finished.end and self.state == State.MOVING:
             self.state = State.HOLDING
             self._fault(Error.DRY)
         self._stop_at_rest()

@@ -30,8 +30,8 @@ class SimPort:
 
     def read(self, timeout: float) -> bytes:
         """What the board has said, or says within `timeout` seconds of its time."""
-        end = self._now + timeout
-        while not (received := self.board.take()) and self._now < end:
+        deadline = self._now + timeout
+        while not (received := self.board.take()) and self._now < deadline:
             self.board.advance(0.001)
             self._now += 0.001
         return received
@@ -60,13 +60,13 @@ class Paced:
 
     def read(self, timeout: float) -> bytes:
         """What the board has said, or says within `timeout` seconds of its time."""
-        end = self.port.now() + timeout
+        deadline = self.port.now() + timeout
         while True:
             clock = time.monotonic()
             self._due = min(self._due + clock - self._clock, self.port.now() + _CATCH_UP_TIME)
             self._clock = clock
             received = self.port.read(max(self._due - self.port.now(), 0.0))
-            if received or self.port.now() >= end:
+            if received or self.port.now() >= deadline:
                 return received
             time.sleep(0.001)
 

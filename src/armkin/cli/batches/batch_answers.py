@@ -60,12 +60,12 @@ class Tally:
         """Warn of rows outside the limits; raise NoSolutionError for rows without a best branch."""
         if not self.bad:
             return
-        first = f"the first is row {self.first_bad}"
+        first_text = f"the first is row {self.first_bad}"
         if not unsolvable:
-            output.warn(f"{self.bad} of {self.rows} rows are outside the limits; {first}")
+            output.warn(f"{self.bad} of {self.rows} rows are outside the limits; {first_text}")
             return
         raise NoSolutionError(
-            f"{self.bad} of {self.rows} rows have no branch within limits; {first}",
+            f"{self.bad} of {self.rows} rows have no branch within limits; {first_text}",
             rows=self.rows,
             unsolved=self.bad,
             row=self.first_bad,
@@ -233,8 +233,8 @@ class BatchRun:
 
 def _heading_bytes(finished: Done, job: Job, file_format: Format, tally: Tally) -> bytes:
     """The heading of a CSV, before its first rows."""
-    first = file_format.name == "csv" and not job.as_json and finished.tally.rows and not tally.rows
-    return (csv_line(finished.heading) + "\n").encode() if first else b""
+    lacks_heading = file_format.name == "csv" and not job.as_json and finished.tally.rows and not tally.rows
+    return (csv_line(finished.heading) + "\n").encode() if lacks_heading else b""
 
 
 def _is_file(path: str) -> bool:

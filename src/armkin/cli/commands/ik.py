@@ -237,10 +237,10 @@ class IkQuestions:
         rounding = _decimal_rounding(self.request.arm, self.task, chunk.values)
         nearest_in_c = compiled_ik.nearest if self.request.ik is compiled_ik.ik else None
         numbers = chunk.numbers_array()
-        answered = ik_columns.branch_columns(
+        branch_table = ik_columns.branch_columns(
             self.request, targets, numbers, self.all_branches, nearest_in_c, rounding=rounding
         )
-        return answered.table, ~answered.unsolved
+        return branch_table.table, ~branch_table.unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
         """What `table` returns, by way of an object a row, for what is not asked of each row by itself."""

@@ -227,13 +227,13 @@ def _carry_out_path(question: _Question, link: Link, out: str | None, plot: str 
         board_link.prepare_motion(arm, machine, link.assume, stands)
         keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.resumed_note(board, link.resume)
-        began = machine.counts() if held is None else held.start
+        start_counts = machine.counts() if held is None else held.start
         with planning():
-            options = question.options | {"start": joints_of(arm, began)}
+            options = question.options | {"start": joints_of(arm, start_counts)}
             plan = _make_plan(question._replace(arm=arm, options=options), json=json)
             path_run.check_gripper(plan, board)
             path_run.check_pauses(plan, sys.stdin.isatty())
-            parts = path_run.plan_parts(plan, began, board.plan_trajectory)
+            parts = path_run.plan_parts(plan, start_counts, board.plan_trajectory)
             _write_files(plan, out, plot)
         if plan.approach is not None and held is None:
             output.note(f"first a joint move to where the path starts: {plan.approach.duration:.3f} s")

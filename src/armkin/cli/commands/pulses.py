@@ -193,10 +193,10 @@ def _text(arm: Arm, answer: Pulses) -> str:
     for i, axis in enumerate("xyz"):
         tip.append([axis, *(fixed_text(position[key][i], 6) for key in ("theoretical", "actual", "difference")), "mm"])
     error = f"{fixed_text(answer['error_mm'], 6)} mm"
-    last = f"the tip is {error} off"
+    last_line = f"the tip is {error} off"
     if "rounded" in answer:
         gain, rounded_error = fixed_text(answer["gain_mm"], 6), fixed_text(answer["rounded"]["error_mm"], 6)
-        last += f", {gain} mm nearer than with each motor rounded by itself ({rounded_error} mm)\n"
-        last += f"best of {answer['tried']} pulse vectors around the target"
+        last_line += f", {gain} mm nearer than with each motor rounded by itself ({rounded_error} mm)\n"
+        last_line += f"best of {answer['tried']} pulse vectors around the target"
     tables = (render.table(motors, (0, 3)), render.table(joints, (0, 5)), render.table(tip, (0, 4)))
-    return "\n\n".join([render.pose_line(arm, answer["joints"]), *tables, last]) + "\n"
+    return "\n\n".join([render.pose_line(arm, answer["joints"]), *tables, last_line]) + "\n"

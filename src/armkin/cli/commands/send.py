@@ -194,17 +194,19 @@ def _plan_and_move(
         board_link.prepare_motion(arm, machine, link.assume, start)
         keep_outs.check_start(machine, arm, link.no_scene)
         held = board_link.resumed_note(board, link.resume)
-        began = machine.counts() if held is None else held.start
+        start_counts = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
-                machine.run(planner.sum_up(goals.plans(planner, began)), lambda elapsed, _: tick(round(1000 * elapsed)))
+                machine.run(
+                    planner.sum_up(goals.plans(planner, start_counts)), lambda elapsed, _: tick(round(1000 * elapsed))
+                )
         else:
             with planning():
-                plans = _all_plans(planner, goals, began)  # every refusal before anything moves
+                plans = _all_plans(planner, goals, start_counts)  # every refusal before anything moves
                 _write_trace(arm, plans, trace)
-            began = machine.counts()
+            start_counts = machine.counts()
             _carry_out(planner, plans, held)
-        plan_totals = planner.total_sent.summary(began)
+        plan_totals = planner.total_sent.summary(start_counts)
         answer: dict[str, Any] = {**plan_totals, "port": machine.port.name, **where_arm_stands(machine)}
     _report_end(arm, plan_totals, answer, goals.problem if isinstance(goals, Stream) else None, trace, json=json)
 
@@ -296,20 +298,20 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
         return
     names = [*arm.joint_names, "tool"]
     heading = ["time_s", *arm.joint_names, *(f"{name}_{axis}_mm" for name in names for axis in "xyz")]
-    began = 0.0
+    begin_time = 0.0
     with output.destination(path) as write:
         write(csv_line(heading) + "\n")
         for i, plan in enumerate(plans):
             trace = plan.trajectory.trace()
             first = 1 if i else 0  # a plan starts where the one before it ends
             rows = zip(
-                (trace.time + began).tolist()[first:],
+                (trace.time + begin_time).tolist()[first:],
                 units.joints_out(arm, trace.joints).tolist()[first:],
                 (trace.position[:, 1:] + 0.0).reshape(len(trace.time), -1).tolist()[first:],
                 strict=True,
             )
             write("".join(csv_line([time, *joints, *positions]) + "\n" for time, joints, positions in rows))
-            began += plan.duration
+            begin_time += plan.duration
 
 
 def _arrival_text(arm: Arm, plan_totals: Mapping[str, Any], answer: Mapping[str, Any]) -> str:

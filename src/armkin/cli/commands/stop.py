@@ -86,8 +86,8 @@ def _end_process(process: int, port: str) -> None:
         ask_to_stop(port, process)
     except OSError as error:
         raise LinkError(f"process {process} holds {port} and cannot be told to stop: {error.strerror}") from None
-    end = time.monotonic() + _REST_TIMEOUT
+    deadline = time.monotonic() + _REST_TIMEOUT
     while holder_pid(port) == process:
-        if time.monotonic() > end:
+        if time.monotonic() > deadline:
             raise LinkError(f"process {process} does not let go of {port}: cut the motors' power if the arm moves")
         time.sleep(0.05)

@@ -160,12 +160,12 @@ def _answer(survey: Workspace) -> Answer:
     if survey.free is not None:
         answer["free_share"] = survey.free / survey.samples
     if survey.extent is not None:
-        size = survey.extent
-        answer["method"] = size.method
-        if size.dimensions == 3:
-            answer["volume_mm3"], answer["volume_error_mm3"] = size.value, size.error
+        extent = survey.extent
+        answer["method"] = extent.method
+        if extent.dimensions == 3:
+            answer["volume_mm3"], answer["volume_error_mm3"] = extent.value, extent.error
         else:
-            answer["area_mm2"], answer["area_error_mm2"] = size.value, size.error
+            answer["area_mm2"], answer["area_error_mm2"] = extent.value, extent.error
     return answer
 
 

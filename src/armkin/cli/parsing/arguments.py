@@ -67,8 +67,8 @@ def standard_input(max_bytes: int, advice: str = "") -> bytes:
     except (OSError, ValueError) as error:
         raise FileError(f"standard input: cannot read: {getattr(error, 'strerror', None) or error}") from None
     if len(content) > max_bytes:
-        size = f"{max_bytes // 1_000_000} MB" if max_bytes >= 1_000_000 else f"{max_bytes // 1000} kB"
-        raise UsageError(f"more than {size} on standard input{advice}")
+        size_text = f"{max_bytes // 1_000_000} MB" if max_bytes >= 1_000_000 else f"{max_bytes // 1000} kB"
+        raise UsageError(f"more than {size_text} on standard input{advice}")
     return content
 
 

@@ -103,14 +103,14 @@ class Columns:
 
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
-        lower = [cell.lower() for cell in cells]
-        places_of = {name: _column_places(lower, name.lower()) for name in self.names}
+        lower_cells = [cell.lower() for cell in cells]
+        places_of = {name: _column_places(lower_cells, name.lower()) for name in self.names}
         if not any(places_of.values()):
             self._refuse_another(cells)
             return False
-        double = [name for name, places in places_of.items() if len(places) > 1]
-        if double:
-            raise UsageError(f"the heading has two columns {double[0]}")
+        doubled_names = [name for name, places in places_of.items() if len(places) > 1]
+        if doubled_names:
+            raise UsageError(f"the heading has two columns {doubled_names[0]}")
         missing_names = [name for name, places in places_of.items() if not places]
         if missing_names:
             names = ", ".join(missing_names)

@@ -37,8 +37,8 @@ def text(arm: Arm, answer: Ik) -> str:
         if turn_text := _turned_text(nearest["angle_deg"]):
             miss += f", {turn_text}"
         rows.append(["", "closest", *map(fixed_text, nearest["joints"]), "", miss])
-    last = len(headings) + 3
-    table = f"{render.table(rows, left_aligned=(0, 1, last), indent='')}\n\n" if len(rows) > 1 else ""
+    last_column = len(headings) + 3
+    table = f"{render.table(rows, left_aligned=(0, 1, last_column), indent='')}\n\n" if len(rows) > 1 else ""
     return f"{arm.name}: {goal}\n\n{table}{_summary(answer)}\n"
 
 

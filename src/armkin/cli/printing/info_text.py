@@ -182,9 +182,9 @@ def _motor_matrix(answer: Mapping[str, Any]) -> str:
     for motor in answer["motors"]:
         total = ""
         for name, weight in motor["joints"].items():
-            size = "" if abs(weight) == 1 else f"{short_text(abs(weight))} "
+            weight_text = "" if abs(weight) == 1 else f"{short_text(abs(weight))} "
             sign = "-" if weight < 0 else "+"
-            total += f" {sign} {size}{name}" if total else f"{sign}{size}{name}".removeprefix("+")
+            total += f" {sign} {weight_text}{name}" if total else f"{sign}{weight_text}{name}".removeprefix("+")
         lines.append(f"  motor {motor['name']} = {total}")
     return "\n".join(lines)
 

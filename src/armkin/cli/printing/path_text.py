@@ -52,8 +52,8 @@ def _clearance_text(nearest: dict[str, Any]) -> str:
     clearance = nearest["mm"]
     if clearance is not None and clearance < 0:
         return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} inside {nearest['with']}, {-clearance:.1f} mm deep"
-    size = "nothing counts" if clearance is None else f"at least {clearance:.1f} mm"
-    return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} nearest to {nearest['with']}, {size}"
+    distance_text = "nothing counts" if clearance is None else f"at least {clearance:.1f} mm"
+    return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} nearest to {nearest['with']}, {distance_text}"
 
 
 def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
@@ -65,8 +65,8 @@ def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     lines = ["", render.table(rows), ""]
     singularity = answer["nearest_singularity"]
     if singularity is not None:
-        size = "infinite" if singularity["condition"] is None else f"{singularity['condition']:.1f}"
-        lines.append(f"nearest to a singularity at {singularity['s_mm']:.3f} mm: condition {size}")
+        condition_text = "infinite" if singularity["condition"] is None else f"{singularity['condition']:.1f}"
+        lines.append(f"nearest to a singularity at {singularity['s_mm']:.3f} mm: condition {condition_text}")
     lines += [deviation_text(plan), *wrist_pass_lines(plan)]
     reduced = plan.reduced
     if reduced.count:

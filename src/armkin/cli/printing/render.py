@@ -141,8 +141,8 @@ def label_values(names: Sequence[str], values: Sequence[float], each_unit: Seque
     """``x = 390, y = 80, z = 300 mm``: a unit where the next number's differs."""
     parts = []
     for i, (name, value, unit) in enumerate(zip(names, values, each_unit, strict=True)):
-        last = i + 1 == len(names) or each_unit[i + 1] != unit
-        parts.append(f"{name} = {short_text(value)}" + (f" {unit}" if last and unit else ""))
+        is_last = i + 1 == len(names) or each_unit[i + 1] != unit
+        parts.append(f"{name} = {short_text(value)}" + (f" {unit}" if is_last and unit else ""))
     return ", ".join(parts)
 
 

@@ -98,10 +98,10 @@ class Chain:
     @cached_property
     def hit_from(self) -> Int | None:
         """The first sample, counted from `first`, with a hit at or behind each sample: (len,); None: no hits."""
-        hit = motion_hits(self.arm, self.q)
-        if hit is None or not hit.any():
+        is_hit = motion_hits(self.arm, self.q)
+        if is_hit is None or not is_hit.any():
             return None
-        samples = np.where(hit, np.arange(len(hit)), len(hit))
+        samples = np.where(is_hit, np.arange(len(is_hit)), len(is_hit))
         return np.asarray(np.minimum.accumulate(samples[::-1])[::-1])
 
     def ends_by_hit(self, i: int) -> bool:

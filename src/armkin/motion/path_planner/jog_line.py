@@ -87,10 +87,10 @@ def _steps_carried(
         residual, J = scaled(arm, task, posture[None], goal)
         change = np.linalg.lstsq(J[0], residual[0], rcond=1e-9)[0]
         # no joint motion moves the tip this way
-        blocked = np.linalg.norm(J[0] @ change - residual[0]) > 0.1 * np.linalg.norm(residual[0])
+        is_blocked = np.linalg.norm(J[0] @ change - residual[0]) > 0.1 * np.linalg.norm(residual[0])
         joint_step = change * unit
         slowness = float(np.max(np.abs(joint_step) / arm.max_speed)) * SLOW_SHARE * top_speed / abs(step)
-        if blocked or (slowness > 1.0 and slowness >= last_slowness):
+        if is_blocked or (slowness > 1.0 and slowness >= last_slowness):
             return 0 if near_singularity and step_number == 2 else step_number - 1, "a singularity is near"
         last_slowness, near_singularity = slowness, slowness > 1.0
         posture = posture + joint_step

@@ -67,11 +67,11 @@ def _knots_in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
 
     rests: (k,) whether the path rests at the edge between two sections.
     """
-    size = np.diff(edges) + 1
-    first = np.repeat(edges[:-1], size)
-    begin = np.cumsum(size) - size
-    i = numbers_within(size) + first
-    last = np.repeat(edges[1:], size)
+    sample_counts = np.diff(edges) + 1
+    first = np.repeat(edges[:-1], sample_counts)
+    begin = np.cumsum(sample_counts) - sample_counts
+    i = numbers_within(sample_counts) + first
+    last = np.repeat(edges[1:], sample_counts)
     parts = [slice(part.start, part.stop) for part in interval_parts(len(i))]
     slopes = np.concatenate([_slopes_at(s, q, i[part], first[part], last[part]) for part in parts])
     smooth = begin[1:][~rests]

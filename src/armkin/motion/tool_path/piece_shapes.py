@@ -28,9 +28,9 @@ from armkin.motion.tool_path.path_pieces import (
 
 def line(task: Task, a: Spot, b: Spot) -> Piece:
     """A straight line; orientation by slerp, sums linearly."""
-    size = float(np.linalg.norm(b.position - a.position))
-    piece = _uniform_piece(task, a, b, lambda f: a.position + f[:, None] * (b.position - a.position), size)
-    return replace(piece, rate=size / piece.length) if piece.length > 0 else piece
+    distance = float(np.linalg.norm(b.position - a.position))
+    piece = _uniform_piece(task, a, b, lambda f: a.position + f[:, None] * (b.position - a.position), distance)
+    return replace(piece, rate=distance / piece.length) if piece.length > 0 else piece
 
 
 def circle(task: Task, a: Spot, centre: Array, normal: Array, angle: float, rise: float, end: Spot | None) -> Piece:

@@ -104,16 +104,16 @@ def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.in
     only if the result could exceed the best one so far.
     """
     counts = np.zeros((len(positions), question.yaws), np.int64)
-    blocked = question.arm.keep_out or question.obstacles.keep_out
+    has_keep_outs = question.arm.keep_out or question.obstacles.keep_out
     unobstructed = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
     pending = np.arange(len(positions))
     for value_question, free_question in zip(each_value(question), each_value(unobstructed), strict=True):
         to_ask, free_counts = pending, reached_counts(free_question, positions[pending])
-        if blocked:
+        if has_keep_outs:
             to_ask = pending[(free_counts > counts[pending]).any(axis=1)]
         if len(to_ask):
             counts[to_ask] = np.maximum(
-                counts[to_ask], reached_counts(value_question, positions[to_ask]) if blocked else free_counts
+                counts[to_ask], reached_counts(value_question, positions[to_ask]) if has_keep_outs else free_counts
             )
         pending = pending[(counts[pending] < len(question.targets)).any(axis=1)]
         if not len(pending):

@@ -35,8 +35,8 @@ class Place:
 def remaining_trajectory(part: Cut, place: Place, present: Array) -> Trajectory:
     """The remainder of a part of a plan, from rest at joint values (n,) [rad | mm] that lie on it."""
     stretches, arm = part.trajectory.stretches, part.trajectory.arm
-    first = remainder(arm, stretches[place.stretch], place.seconds, present)
-    return Trajectory(arm, present, (first, *stretches[place.stretch + 1 :]))
+    first_remainder = remainder(arm, stretches[place.stretch], place.seconds, present)
+    return Trajectory(arm, present, (first_remainder, *stretches[place.stretch + 1 :]))
 
 
 def left_of(

@@ -69,14 +69,16 @@ def line_segments(
 
     A very long line computes its segments on iteration.
     """
-    first, last = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
-    if not (last - first).any():
-        return Move(first, last, (), 0)
-    line = LineSegments(start=first, end=last, law=law, clock=clock, min_interval=min_interval, pieces=pieces)
+    start_counts, end_counts = np.asarray(start, dtype=np.int64), np.asarray(end, dtype=np.int64)
+    if not (end_counts - start_counts).any():
+        return Move(start_counts, end_counts, (), 0)
+    line = LineSegments(
+        start=start_counts, end=end_counts, law=law, clock=clock, min_interval=min_interval, pieces=pieces
+    )
     if len(line) > _EAGER_SEGMENTS:
-        return Move(first, last, line, round(law.duration * clock))
+        return Move(start_counts, end_counts, line, round(law.duration * clock))
     segments = tuple(line)
-    return Move(first, last, segments, sum(map(cycles_of, segments)))
+    return Move(start_counts, end_counts, segments, sum(map(cycles_of, segments)))
 
 
 @dataclass(frozen=True)
@@ -103,10 +105,10 @@ class LineSegments:
                 change = speed_change(float(speed[i]), float(speed[i + 1]))
                 counts = (self.start + span * share[i + 1]).tolist()
                 drift = _SPARE_SHARE * steps * float(share[i + 1] - share[i])
-                last = is_last_block and i + 2 == len(times)
+                is_last = is_last_block and i + 2 == len(times)
                 unheard = unheard and float(share[i + 1]) * steps < _NO_STEP
                 seconds = (b - a) * (UNHEARD_SHARE if unheard else 1.0)
-                yield cutter.piece(seconds, counts, change, drift, None if last else _MAKE_UP_SHARE, unheard)
+                yield cutter.piece(seconds, counts, change, drift, None if is_last else _MAKE_UP_SHARE, unheard)
                 unheard = False
         if [place // STEP for place in cutter.places] != self.end.tolist():
             raise AssertionError("a line's rates do not lead to its end")

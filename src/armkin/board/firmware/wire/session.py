@@ -95,9 +95,9 @@ class Session:
         """Send HELLO and wait for INFO. Repeating a nonce is harmless, so an answer to an earlier one counts, too."""
         self._tag = (self._tag + 1) & 255
         self.port.write(b"\0" + protocol.encode_frame(protocol.hello(self._tag, nonce)) * self.line.copies)
-        end = self.port.now() + timeout
-        while self.port.now() < end:
-            for payload in self.line.splitter.feed(self.port.read(max(0.001, end - self.port.now()))):
+        deadline = self.port.now() + timeout
+        while self.port.now() < deadline:
+            for payload in self.line.splitter.feed(self.port.read(max(0.001, deadline - self.port.now()))):
                 version = protocol.info_version(payload)
                 if version is not None and version != protocol.VERSION:
                     raise reply_checks.other_version(self.port.name, version)
@@ -228,10 +228,10 @@ class Session:
         begin = self.port.now()
         while self.port.now() - begin < _STATUS_TIMEOUT:
             tags.append(self._ask(page, self.line.copies))  # several copies, in case some are lost
-            end = self.port.now() + self.line.patience
-            while self.port.now() < end:
+            deadline = self.port.now() + self.line.patience
+            while self.port.now() < deadline:
                 self._status = None
-                self._hear(max(0.001, end - self.port.now()))
+                self._hear(max(0.001, deadline - self.port.now()))
                 answer: Status | None = self._status
                 if answer is not None and answer.tag in tags and answer.page == page:
                     # answers keep their order, so the earlier ones were lost
