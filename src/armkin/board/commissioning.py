@@ -57,7 +57,7 @@ class Findings:
 
 def directions(board: Board, person: Operator) -> set[int]:
     """The motors whose direction differs from the robot file, found by moving each joint by up to 2 degrees or mm."""
-    arm, inverted = board.arm, set()
+    arm, inverted_motors = board.arm, set()
     _able_to_jog(board, person)
     person.say("Directions: hold + to move a joint by up to 2 degrees (mm), - to take it back; Enter when you saw it.")
     for joint, name in enumerate(arm.joint_names):
@@ -72,8 +72,8 @@ def directions(board: Board, person: Operator) -> set[int]:
             if answer != "a":
                 break
         if answer == "n":
-            inverted |= _motors_of(arm, joint, person)
-    return inverted
+            inverted_motors |= _motors_of(arm, joint, person)
+    return inverted_motors
 
 
 def zeros(board: Board, person: Operator, *, forget: bool = False) -> dict[int, int]:

@@ -143,14 +143,14 @@ def _carry_out_motion(emulated: Emulated, machine: Backend, goal: Array, speed: 
     try:
         machine.run([plan])
     except (ArmkinError, StoppedError):
-        succeeded = False
+        has_succeeded = False
     else:
-        succeeded = True
+        has_succeeded = True
         assert _is_near(emulated, plan.end.tolist()), (
             f"said to be done: {plan.end.tolist()}, pins at {_pin_counts(emulated)}"
         )
     assert emulated.line.now() - start_time < plan.duration + PATIENCE, "a hang"
-    return succeeded
+    return has_succeeded
 
 
 def _random_goals(emulated: Emulated, seed: int, size: float = 0.15) -> Iterator[Array]:

@@ -90,9 +90,9 @@ def load_command(name: str) -> Any:
     """Import a command's module and let Typer read its function; once in a process that runs many command lines."""
     word = f"{name}_" if iskeyword(name) else name  # Python has `import` for itself
     function = getattr(import_module(f"armkin.cli.commands.{word}"), word)
-    single = typer.Typer(add_completion=False, rich_markup_mode=None)
-    single.command(name, cls=Command, context_settings=_SETTINGS)(link_trace.add_trace_option(function))
-    return typer.main.get_command(single)
+    typer_app = typer.Typer(add_completion=False, rich_markup_mode=None)
+    typer_app.command(name, cls=Command, context_settings=_SETTINGS)(link_trace.add_trace_option(function))
+    return typer.main.get_command(typer_app)
 
 
 app = typer.Typer(cls=Commands, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")

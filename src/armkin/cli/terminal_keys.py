@@ -32,33 +32,33 @@ class Keys:
         """The next key: a character, ``+`` and ``-`` also for arrows, a line feed for Enter."""
         while not self._next_key:
             self._next_key = self._poll(0.5)
-        pressed, self._next_key = self._next_key, ""
-        return pressed
+        pressed_key, self._next_key = self._next_key, ""
+        return pressed_key
 
     def ask(self, question: str, answers: str) -> str:
         """One of some keys; what was pressed before the question is none."""
         self._wait_for_silence()
         output.note(f"{question} [{'/'.join(answers)}]")
-        while (pressed := self.key().lower()) not in answers:
+        while (pressed_key := self.key().lower()) not in answers:
             pass
-        return pressed
+        return pressed_key
 
     def held(self, key: str) -> Callable[[], bool] | None:
         """Whether a key is still held, asked again and again; None if it was pressed and let go at once."""
-        pressed = self._poll(_FIRST_REPEAT_TIME)
-        if pressed != key:
-            self._next_key = pressed
+        pressed_key = self._poll(_FIRST_REPEAT_TIME)
+        if pressed_key != key:
+            self._next_key = pressed_key
             return None
         last = time.monotonic()
 
         def is_held() -> bool:
             nonlocal last
-            pressed = self._poll(_POLL_TIME)
-            if pressed == key:
+            pressed_key = self._poll(_POLL_TIME)
+            if pressed_key == key:
                 last = time.monotonic()
-            elif pressed:
-                self._next_key = pressed
-            return pressed in ("", key) and time.monotonic() - last < _REPEAT_PERIOD
+            elif pressed_key:
+                self._next_key = pressed_key
+            return pressed_key in ("", key) and time.monotonic() - last < _REPEAT_PERIOD
 
         return is_held
 

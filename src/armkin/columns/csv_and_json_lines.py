@@ -37,23 +37,23 @@ def to_json_lines(table: Table, lines: Lines | None = None) -> bytes:
     return (lines or _print_lines)(table, [*separators, "}\n"], json.dumps, "null")
 
 
-def _print_lines(table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str) -> bytes:
+def _print_lines(table: Table, separators: list[str], quote: Callable[[Any], str], missing_text: str) -> bytes:
     """See `Lines`."""
     count = row_count(table)
     if count >= PYARROW_ROWS and (arrow := _import_arrow()) is not None:
         parts = (table if count <= ROWS else take_rows(table, slice(i, i + ROWS)) for i in range(0, count, ROWS))
-        return b"".join([_print_by_arrow(arrow, block, separators, quoted, missing_text) for block in parts])
-    columns = [_column_texts(column, quoted, missing_text) for column in table.values()]
+        return b"".join([_print_by_arrow(arrow, block, separators, quote, missing_text) for block in parts])
+    columns = [_column_texts(column, quote, missing_text) for column in table.values()]
     if not count:
         return b""
     line = "%s".join(text.replace("%", "%%") for text in separators)
     return "".join([line % row for row in zip(*columns, strict=True)]).encode()
 
 
-def _column_texts(column: Column, quoted: Callable[[Any], str], missing_text: str) -> list[str]:
+def _column_texts(column: Column, quote: Callable[[Any], str], missing_text: str) -> list[str]:
     """The texts of a column; missing: what stands for nan."""
     if isinstance(column, Words):
-        names = [*map(quoted, column.names), missing_text]
+        names = [*map(quote, column.names), missing_text]
         return [names[i] for i in column.index.tolist()]
     if column.dtype == bool:
         return ["true" if value else "false" for value in column.tolist()]
@@ -77,10 +77,10 @@ def _import_arrow() -> Any:
 
 
 def _print_by_arrow(
-    pa: Any, table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str
+    pa: Any, table: Table, separators: list[str], quote: Callable[[Any], str], missing_text: str
 ) -> bytes:
     """The rows as bytes, texts joined by Arrow; between: what stands around each column."""
-    pieces = [_arrow_texts(pa, column, quoted, missing_text) for column in table.values()]
+    pieces = [_arrow_texts(pa, column, quote, missing_text) for column in table.values()]
     if len(set(separators[1:-1])) <= 1 and not separators[0]:  # one separator: half as many pieces to join
         lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(separators[1]))
         lines = pa.compute.binary_join_element_wise(lines, pa.scalar(""), pa.scalar(separators[-1]))
@@ -92,9 +92,9 @@ def _print_by_arrow(
     return bytes(memoryview(buffer)[ends[0] : ends[-1]])
 
 
-def _arrow_texts(pa: Any, column: Column, quoted: Callable[[Any], str], missing_text: str) -> Any:
+def _arrow_texts(pa: Any, column: Column, quote: Callable[[Any], str], missing_text: str) -> Any:
     if isinstance(column, Words):
-        names = pa.array([*map(quoted, column.names), missing_text], pa.string())
+        names = pa.array([*map(quote, column.names), missing_text], pa.string())
         return names.take(pa.array(np.where(column.index < 0, len(column.names), column.index)))
     if column.dtype == bool:
         return pa.array(["false", "true"]).take(pa.array(column.astype(np.int64)))

@@ -86,14 +86,14 @@ class Parts:
             return
         except ValueError:
             raise FileError(f"{place}: this is no job of armkin's; remove {self.folder}", file=str(place)) from None
-        differing = [name for name in {**earlier_job, **self.job} if earlier_job.get(name) != self.job.get(name)]
-        if differing:
-            names = ", ".join(differing)
+        differing_names = [name for name in {**earlier_job, **self.job} if earlier_job.get(name) != self.job.get(name)]
+        if differing_names:
+            names = ", ".join(differing_names)
             raise UsageError(
-                f"{self.path}.parts belongs to another job: {names} differ{'s' * (len(differing) == 1)} from before; "
-                f"give them as they were, or remove {self.folder}",
+                f"{self.path}.parts belongs to another job: {names} differ{'s' * (len(differing_names) == 1)} from "
+                f"before; give them as they were, or remove {self.folder}",
                 file=self.path,
-                differs=differing,
+                differs=differing_names,
             )
 
     def about(self, number: int) -> dict[str, Any] | None:

@@ -46,8 +46,8 @@ def branch_columns(
 ) -> BranchTable:
     """The columns of ik: targets (N, ...) [mm, rad], rows (N,) their numbers; all_branches: not the best alone.
 
-    more: of `armkin.ik`. The request sweeps no joint. quick: `nearest_branches` by machine code; None where it does not
-    serve.
+    nearest_in_c: `nearest_branches` by machine code; None where it does not serve. options: of `armkin.ik`. The request
+    sweeps no joint.
     """
     arm, near = request.arm, units.joints_in(request.arm, request.near_out)
     free_indices = [i for i, name in enumerate(arm.joint_names) if name not in request.held]
@@ -85,7 +85,7 @@ class _Answers(NamedTuple):
 def _list_branches(
     request: choose_branch.Request, answers: _Answers, rows: NDArray[np.integer], all_branches: bool, nearest_in_c: Any
 ) -> BranchTable:
-    """Lines of a block of targets: all their branches, or the nearest one; quick: what finds that in C, if it can."""
+    """Lines of a block of targets: all their branches, or the nearest one (`nearest_in_c`)."""
     solutions, block, scale = answers.solutions, answers.rows, units.joint_scale(request.arm)
     q, valid = answers.q[block], solutions.valid[block]
     within_limits, is_free = answers.within_limits[block], answers.is_free[block]

@@ -55,8 +55,8 @@ def write_parts(file: IO[bytes], parts: Callable[[], Iterable[IO[bytes]]]) -> No
             dtype = np.result_type(*(head[i].written_dtype for head in heads))
             with archive.open(archive_member(name), "w", force_zip64=True) as member_file:
                 shape = (sum(head[i].rows for head in heads),)
-                described = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
-                np.lib.format.write_array_header_1_0(member_file, described)
+                array_header = {"descr": np.lib.format.dtype_to_descr(dtype), "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_1_0(member_file, array_header)
                 for part, head in zip(parts(), heads, strict=True):
                     column = head[i].read(part)
                     values = column.texts() if isinstance(column, Words) else column

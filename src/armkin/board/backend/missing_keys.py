@@ -47,7 +47,7 @@ def missing_for_motion(arm: Arm, *, board: bool = True) -> list[str]:
 
 def lines_to_add(arm: Arm) -> list[str]:
     """Lines to add to a robot file so that its arm moves on a board."""
-    return [line for _, added in find_lacks(arm) for line in added]
+    return [line for _, lack_lines in find_lacks(arm) for line in lack_lines]
 
 
 def find_lacks(arm: Arm, *, board: bool = True) -> list[Lack]:
@@ -89,8 +89,8 @@ def _drive_lines(arm: Arm, joints: list[str], board: bool) -> list[str]:
 def _axis_names(arm: Arm) -> tuple[str, ...]:
     """Names of the stepper axes of the arm's board, or of the one that `without_board` proposes."""
     kind = _board_for(arm) if arm.board is None else arm.board.kind
-    foreign = board_catalogue.foreign_board(kind)
-    return BOARDS[kind].steppers if foreign is None else foreign.axes
+    foreign_board = board_catalogue.foreign_board(kind)
+    return BOARDS[kind].steppers if foreign_board is None else foreign_board.axes
 
 
 def _board_for(arm: Arm) -> str:
@@ -109,16 +109,17 @@ def without_board(arm: Arm) -> list[Lack]:
         driver = f", driver: {_DRIVER}" if has_steppers else ""
         choice = f"kinds: {', '.join(board_catalogue.kind_names())}; drivers: {', '.join(DRIVERS)}"
         return [("it has no board", [f"board: {{kind: {kind}{driver}}}   # for example; {choice}"])]
-    foreign = board_catalogue.foreign_board(arm.board.kind)
-    return _without_driver(arm, arm.board) if foreign is None else _without_foreign_axes(arm, foreign)
+    foreign_board = board_catalogue.foreign_board(arm.board.kind)
+    return _without_driver(arm, arm.board) if foreign_board is None else _without_foreign_axes(arm, foreign_board)
 
 
-def _without_foreign_axes(arm: Arm, foreign: ForeignBoard) -> list[Lack]:
+def _without_foreign_axes(arm: Arm, foreign_board: ForeignBoard) -> list[Lack]:
     """Missing axes of a board that has its own drivers and settings."""
     without_axis = [motor.name for motor in arm.motors if motor.kind != "bus" and motor.axis is None]
     if not without_axis:
         return []
-    line = f"axis: {foreign.axes[0]}   # into the drives of {', '.join(without_axis)} ({', '.join(foreign.axes)})"
+    axes = foreign_board.axes
+    line = f"axis: {axes[0]}   # into the drives of {', '.join(without_axis)} ({', '.join(axes)})"
     return [(f"motors {', '.join(without_axis)} have no axis", [line])]
 
 

@@ -62,9 +62,9 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
     for stretch in trajectory.stretches:
         times = [stretch.duration] if isinstance(stretch, Straight) else np.linspace(0.0, stretch.duration, _SAMPLES)
         q = stretch.evaluate(np.asarray(times, dtype=float))
-        farther = excess_over_limits(arm, q).max(axis=0) > excess + SLACK
-        if farther.any():
-            raise _farther_out_error(arm, int(farther.argmax()), trajectory.start)
+        goes_farther = excess_over_limits(arm, q).max(axis=0) > excess + SLACK
+        if goes_farther.any():
+            raise _farther_out_error(arm, int(goes_farther.argmax()), trajectory.start)
 
 
 def jog_goal(arm: Arm, present: Array, joint: int, change: float, *, refuse: bool) -> Array:

@@ -199,16 +199,16 @@ class ServoArm(Backend):
     def _follow(self, trajectory: Trajectory, report: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows the plan's time down, so that the arm stays on its path."""
         last = last_check = self.port.now()
-        t, pace, stopping = 0.0, 1.0, False
+        t, pace, is_stopping = 0.0, 1.0, False
         ramp = max(braking_time(trajectory), SEND_PERIOD)
         while t < trajectory.duration and pace > 0.0:
             time = self.port.now()
             if time - last < SEND_PERIOD - 1e-4:
                 self.port.read(SEND_PERIOD - (time - last))
                 continue
-            stopping = stopping or self._stop()
+            is_stopping = is_stopping or self._stop()
             step, last = min(time - last, MAX_OVERRUN), time
-            if stopping:
+            if is_stopping:
                 pace = max(0.0, pace - step / ramp)
             t = min(trajectory.duration, t + step * pace)
             t_sent = min(trajectory.duration, t + SEND_PERIOD * pace)
@@ -217,7 +217,7 @@ class ServoArm(Backend):
             if time - last_check > WATCH_PERIOD:
                 last_check = time
                 self._watch(pulses(self.arm, trajectory.q(t)))
-        if stopping:
+        if is_stopping:
             self.hold()
             raise StoppedError
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 
-def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[int, Any, str, float, float, float]]:
+def steppers(arm: Arm, board_name: str, letters: Iterable[str]) -> Iterator[tuple[int, Any, str, float, float, float]]:
     """Number, motor, name, steps a unit, greatest speed and acceleration [units/s, units/s2] of the arm's motors.
 
     Raises UsageError, naming the motor, for one that is no stepper, or has no axis of its own.
@@ -39,10 +39,11 @@ def steppers(arm: Arm, called: str, letters: Iterable[str]) -> Iterator[tuple[in
     unused = list(letters)
     for number, (motor, name) in enumerate(zip(arm.motors, motor_names(arm), strict=True)):
         if motor.kind != "stepper":
-            raise UsageError(f"{file}: motor {name} is a {motor.kind}; {called} drives steppers alone")
+            raise UsageError(f"{file}: motor {name} is a {motor.kind}; {board_name} drives steppers alone")
         if motor.axis not in unused:
             raise UsageError(
-                f"{file}: motor {name} is on axis {motor.axis}; {called} has {', '.join(letters)}, one motor on each"
+                f"{file}: motor {name} is on axis {motor.axis}; {board_name} has {', '.join(letters)}, "
+                "one motor on each"
             )
         unused.remove(motor.axis)
         steps = motor.pulses_per_unit()

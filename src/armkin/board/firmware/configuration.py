@@ -113,7 +113,7 @@ def _refuse_incomplete(arm: Arm, *, board: bool) -> None:
         )
     if lacks := missing_keys.find_lacks(arm, board=board):
         summary = ", ".join(words for words, _ in lacks)
-        lines = [line for _, added in lacks for line in added]
+        lines = [line for _, lack_lines in lacks for line in lack_lines]
         raise UsageError(
             "".join([f"{arm.name}: {summary}; add to {arm.path or 'its file'}:", *(f"\n  {x}" for x in lines)]),
             robot_file=arm.path,
@@ -204,8 +204,8 @@ def _switch_guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[Guard
     """The guard of every switch input of the board: it stops the joint that it homes in the switch's direction."""
     guards = [GuardImage() for _ in board.switches]
     per_count = np.linalg.pinv(arm.motor_gain)
-    for joint, (homing, guarded) in enumerate(zip(arm.homing, arm.hard_limits, strict=True)):
-        if homing is None or not guarded:
+    for joint, (homing, is_hard_limit) in enumerate(zip(arm.homing, arm.hard_limits, strict=True)):
+        if homing is None or not is_hard_limit:
             continue
         motor_weights = per_count[joint] * homing.direction
         motor_weights[np.abs(motor_weights) < 1e-12 * np.abs(motor_weights).max()] = 0.0
@@ -219,10 +219,10 @@ def _switch_guards(arm: Arm, board: Board, axes: tuple[int, ...]) -> tuple[Guard
 def _weight_bytes(weights: Array) -> list[int]:
     """Weights as signed bytes: exact where they are small whole multiples of the least, else to 1/127."""
     smallest = np.abs(weights[weights != 0]).min()
-    scaled = weights / smallest
-    if np.abs(scaled).max() > 127 or np.abs(scaled - np.rint(scaled)).max() > 1e-9:
-        scaled = weights * (127 / np.abs(weights).max())
-    return [int(value) for value in np.rint(scaled)]
+    scaled_weights = weights / smallest
+    if np.abs(scaled_weights).max() > 127 or np.abs(scaled_weights - np.rint(scaled_weights)).max() > 1e-9:
+        scaled_weights = weights * (127 / np.abs(weights).max())
+    return [int(value) for value in np.rint(scaled_weights)]
 
 
 def _check_servo(name: str, low: int, high: int) -> None:

@@ -72,8 +72,8 @@ def searches(
     joint_numbers = [joint for joint, name in enumerate(arm.joint_names) if not names or name in names]
     joint_numbers = [joint for group in _coupled_groups(arm, joint_numbers) for joint in group]
     orders = _homing_orders(arm, joint_numbers, rest_at_home=rest_at_home)
-    ordered = sorted(orders, key=lambda joint: (orders[joint] is None, orders[joint] or 0, joint))
-    return [_search_of(arm, configuration, joint) for joint in ordered]
+    joints_in_order = sorted(orders, key=lambda joint: (orders[joint] is None, orders[joint] or 0, joint))
+    return [_search_of(arm, configuration, joint) for joint in joints_in_order]
 
 
 def _homing_orders(arm: Arm, joint_numbers: Sequence[int], *, rest_at_home: bool) -> dict[int, int | None]:
@@ -104,7 +104,7 @@ def home_joints(
     homing, so the result has the errors of positions that were known before.
     """
     arm = machine.arm
-    pending = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
+    searches_left = searches(arm, machine.configuration, names, rest_at_home=rest_at_home)
     if not machine.configured:
         machine.configure()
     machine.enable(machine.configuration.axes)
@@ -112,8 +112,8 @@ def home_joints(
     axes = list(machine.configuration.axes)
     lost_before, lost_steps = lost_joints(machine), []
     per_count = np.linalg.pinv(arm.motor_gain)
-    for group in _groups_in_order(arm, pending):
-        for search in [search for search in pending if search.joint in group]:
+    for group in _groups_in_order(arm, searches_left):
+        for search in [search for search in searches_left if search.joint in group]:
             name = arm.joint_names[search.joint]
             announce(name)
             status, edge = _run_search(machine, search)
@@ -126,9 +126,9 @@ def home_joints(
     return lost_steps
 
 
-def _groups_in_order(arm: Arm, pending: Sequence[Search]) -> list[list[int]]:
+def _groups_in_order(arm: Arm, searches: Sequence[Search]) -> list[list[int]]:
     """Groups of the searched joints that home together, by the first search in each."""
-    order = {search.joint: i for i, search in enumerate(pending)}
+    order = {search.joint: i for i, search in enumerate(searches)}
     firsts = [(min(order[j] for j in group if j in order), group) for group in _coupled_groups(arm, list(order))]
     return [group for _, group in sorted(firsts)]
 
@@ -188,8 +188,8 @@ def switch_levels(arm: Arm, configuration: Configuration) -> Callable[[int, Sequ
         if j is None or homing is None:
             return True
         value = joints(arm, start + np.array([net[axis] for axis in axes]))[j]
-        pressed = (value - _switch_value(arm, j)) * homing.direction >= 0
-        return bool(pressed) == (homing.normally == "closed")  # a pressed switch opens, or closes to ground
+        is_pressed = (value - _switch_value(arm, j)) * homing.direction >= 0
+        return bool(is_pressed) == (homing.normally == "closed")  # a pressed switch opens, or closes to ground
 
     return level
 
@@ -201,10 +201,10 @@ def _coupled_groups(arm: Arm, joint_numbers: Sequence[int]) -> list[list[int]]:
         group = {min(remaining)}
         while True:
             motors = np.abs(arm.motor_gain[:, sorted(group)]).sum(axis=1) > 0
-            coupled = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
-            if coupled == group:
+            coupled_joints = set(np.flatnonzero(np.abs(arm.motor_gain[motors]).sum(axis=0)).tolist())
+            if coupled_joints == group:
                 break
-            group = coupled
+            group = coupled_joints
         groups.append(sorted(group))
         remaining -= group
     return groups

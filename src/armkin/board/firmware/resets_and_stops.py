@@ -79,8 +79,8 @@ def must_be_told(machine: Machine) -> PositionLostError:
     """The error of a motion while the position is lost."""
     reason = "the arm's position is lost"
     if machine.info.config and not machine.configured:
-        changed = f"{machine.arm.path} has changed"
-        reason = f"the board is configured for another arm, or {changed}: its position is lost"
+        change_text = f"{machine.arm.path} has changed"
+        reason = f"the board is configured for another arm, or {change_text}: its position is lost"
     elif machine.configured and (impossible := why_impossible(machine.arm, machine.counts())):
         reason = f"{reason}: {impossible}"
     return position_lost_error(machine, reason)

@@ -57,12 +57,12 @@ class Trip:
     """
 
     def __init__(
-        self, machine: FirmwareMachine, parts: Sequence[Cut], started: tuple[Note, float] | None = None
+        self, machine: FirmwareMachine, parts: Sequence[Cut], begun_note: tuple[Note, float] | None = None
     ) -> None:
         self._machine, self._file = machine, note_path(machine.port.name)
         self._keeps_note = not machine.port.simulated
         start = parts[0].start.tolist() if parts else list(machine.counts())
-        self._note, self._seconds_before = started or (Note(machine.arm.sha256, plan_digest(parts), start, 0.0), 0.0)
+        self._note, self._seconds_before = begun_note or (Note(machine.arm.sha256, plan_digest(parts), start, 0.0), 0.0)
         self._note = replace(self._note, seconds=self._seconds_before, stands=None)
 
     def __enter__(self) -> Self:
@@ -103,8 +103,8 @@ def under_way(
     """
     place = None if note is None else find_place(machine, note, cuts)
     remaining = cuts if place is None else remaining_parts(machine, cuts, place)
-    started = None if note is None or place is None else (note, place.elapsed)
-    with Trip(machine, cuts, started) as trip:
+    begun_note = None if note is None or place is None else (note, place.elapsed)
+    with Trip(machine, cuts, begun_note) as trip:
         yield remaining, 0 if place is None else place.part, trip.progress
 
 

@@ -44,12 +44,12 @@ def stream_frames(
 ) -> Status:
     """Send all frames and wait until the arm is at rest; report_left: takes the seconds of motion left."""
     has_more, at_rest = True, False  # whether the submitted motion ends at rest
-    postponed: MotionFrame | object | None = None  # first frame of the next move
+    next_frame: MotionFrame | object | None = None  # first frame of the next move
     while has_more or session.pending[0]:
         while has_more and session.pending[0] < 2:
-            batch, postponed = (postponed or next(frames, _DONE)), None
+            batch, next_frame = (next_frame or next(frames, _DONE)), None
             if isinstance(batch, MotionFrame) and at_rest and not _may_follow_rest(session, batch):
-                postponed = batch
+                next_frame = batch
                 break
             if batch is _DONE:
                 has_more = False
@@ -133,17 +133,17 @@ def _queued_times(session: Session, frames: Sequence[tuple[float, int, int]], un
     """
     bit = 10 / session.port.baud
     line_free = motion_start = 0.0  # times at which the line is free, and the arm begins to move
-    queued = list[float]()
+    queue_times = list[float]()
     for number, (_, segments, size) in enumerate(frames):
-        credit_time = queued[number - 2] + session.line.slowest + _ACK_BYTES * bit if number > 1 else 0.0
+        credit_time = queue_times[number - 2] + session.line.slowest + _ACK_BYTES * bit if number > 1 else 0.0
         line_free = max(line_free, credit_time) + size * bit
-        work_start = max(line_free, queued[-1] if queued else 0.0)
+        work_start = max(line_free, queue_times[-1] if queue_times else 0.0)
         work_end = work_start + _FRAME_TIME + segments * _SEGMENT_TIME
-        queued.append(
+        queue_times.append(
             work_end + (_TICK_FACTOR - 1) * max(0.0, work_end - max(work_start, motion_start)) if number else work_end
         )
         motion_start = motion_start or work_end + _LEAD_TIME + unheard
-    return queued
+    return queue_times
 
 
 def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unheard: float) -> float:
@@ -152,20 +152,22 @@ def _lateness(session: Session, frames: Sequence[tuple[float, int, int]], unhear
     The board's queue must always hold the time to a stop (section 7). From rest, that is at most the time since the
     start; the queue of a slow arm need only not be empty.
     """
-    queued, time_saved = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD_SHARE - 1)
+    queue_times, time_saved = _queued_times(session, frames, unheard), unheard * (1 / UNHEARD_SHARE - 1)
     lateness = elapsed = 0.0  # elapsed: [s] of motion before a frame
     for number, (seconds, _, _) in enumerate(frames):
         if number:
             stop_time = (elapsed - _SPARE_TIME - time_saved * (_QUEUE_RATE - 1)) / _QUEUE_RATE
-            lateness = max(lateness, queued[number] - queued[0] - min(elapsed, max(_SLOW_STOP - time_saved, stop_time)))
+            lateness = max(
+                lateness, queue_times[number] - queue_times[0] - min(elapsed, max(_SLOW_STOP - time_saved, stop_time))
+            )
         elapsed += seconds
     return lateness
 
 
 def _seconds_queued(session: Session) -> float:
     """An estimate of the seconds of motion that the board has or will have, from its last reply."""
-    queued = 0.0 if session.state == State.IDLE else session.queued / 1000 - (session.port.now() - session.heard)
-    return session.under_way + max(0.0, queued)
+    seconds = 0.0 if session.state == State.IDLE else session.queued / 1000 - (session.port.now() - session.heard)
+    return session.under_way + max(0.0, seconds)
 
 
 def motion_batches(
@@ -216,8 +218,8 @@ def _insert_pause(session: Session, segments: list[Segment], room: int, clock: i
     follow_time = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH_SEGMENTS[1], room)], clock))
     if not session.line.damaged and min(_seconds_queued(session), follow_time) >= pause:
         return []
-    if delayed := delay_segment(segments[0], pause, clock):
-        segments[0] = delayed
+    if delayed_segment := delay_segment(segments[0], pause, clock):
+        segments[0] = delayed_segment
     else:
         ticks = math.ceil(pause * clock / _TICK_CYCLES)
         segments.insert(0, Segment(ticks, math.ceil(pause * clock / ticks), 0, (0,) * len(segments[0].rates)))

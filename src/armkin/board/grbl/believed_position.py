@@ -118,8 +118,8 @@ class Place:
             for name, values in offsets.items()
         }
         systems = (word for word in words if word.partition(".")[0] in _LASTING_OFFSETS)
-        scaled = (word for word in words if word.startswith("G51"))
-        self._offsets_left = {**own_offsets, "system": next(systems, "none"), "scale": next(scaled, "G50")}
+        scale_words = (word for word in words if word.startswith("G51"))
+        self._offsets_left = {**own_offsets, "system": next(systems, "none"), "scale": next(scale_words, "G50")}
         return words[0]
 
     def _machine_steps(self, report: Report) -> NDArray[np.int64]:

@@ -85,28 +85,28 @@ class GrblMachine(StepperArm):
 
         The position is lost: its steps may mean something else now. Raises LinkError if a setting did not take.
         """
-        written = self.setting_differences()
-        for difference in written:
+        differences = self.setting_differences()
+        for difference in differences:
             self.session.ask(difference.line())
         self.settings = self.session.settings()
-        if written:
+        if differences:
             self._place.forget("its settings were written")
             with suppress(LinkError):  # an alarm or a lost connection does not matter here
                 self._reset()
         remaining = self.setting_differences()
         if remaining:
             raise LinkError(f"GRBL did not keep what was written: {remaining[0]}")
-        return written
+        return differences
 
     def _ready(self) -> None:
         """Read where the arm stands. Raises LinkError if settings or state forbid a motion."""
         report = self.session.status()
         self.session.demand_rest(report)
-        serious = _serious_differences(self)
-        if serious:
-            others = f", and {len(serious) - 1} more" if len(serious) > 1 else ""
+        differences = _serious_differences(self)
+        if differences:
+            others = f", and {len(differences) - 1} more" if len(differences) > 1 else ""
             raise LinkError(
-                f"GRBL's settings do not fit {self.arm.name}: {serious[0]}{others}; armkin setup writes them"
+                f"GRBL's settings do not fit {self.arm.name}: {differences[0]}{others}; armkin setup writes them"
             )
         if report.state != "Idle":
             raise LinkError(f"GRBL is in state {report.state}, not Idle: home it, or unlock it once you know why")
@@ -197,9 +197,9 @@ class GrblMachine(StepperArm):
         of_homing = [
             difference for difference in self.setting_differences() if difference.number in settings.HOMING_SETTINGS
         ]
-        serious = [difference for difference in of_homing if difference.actual is not None]
-        if serious:
-            raise LinkError(f"GRBL would not home as {self.arm.name} needs: {serious[0]}; armkin setup writes it")
+        differences = [difference for difference in of_homing if difference.actual is not None]
+        if differences:
+            raise LinkError(f"GRBL would not home as {self.arm.name} needs: {differences[0]}; armkin setup writes it")
         self._place.forget("its homing was interrupted")
         try:
             self.session.ask("$H", patience=180.0)

@@ -111,14 +111,14 @@ class Session:
         self.realtime(replies.JOG_CANCEL)  # grblHAL drops an unfinished line
         self._send(_NONSENSE_CHARACTERS)
         try:
-            obeyed = self._wait(lambda: not self._sent, _ANSWER_TIMEOUT)
+            is_answered = self._wait(lambda: not self._sent, _ANSWER_TIMEOUT)
         except GrblError as error:
             if not error.error:
                 raise
             with suppress(GrblError):  # the first error may belong to another program's line
                 self._wait(lambda: False, _LATE_ANSWERS)
             return
-        if not obeyed:
+        if not is_answered:
             raise LinkError(f"GRBL on {self.port.name} takes no lines: does it dwell for another program?")
         self.realtime(replies.HOLD)
         self._wait(lambda: self.status().state not in ("Run", "Jog"), _SILENCE_TIMEOUT)
@@ -160,12 +160,12 @@ class Session:
         """Offsets by name (G54 to G59, G92, TLO) and the words of ``$G``: each as three readings in a row agree on."""
         readings: dict[str, tuple[Any, int]] = {}  # last value of each name, and how often in a row
         for _ in range(_MAX_READINGS):
-            reading: dict[str, Any] = dict(
+            offset_words: dict[str, Any] = dict(
                 pair for line in self.ask("$#") if (pair := replies.parse_offset(line)) is not None
             )
             words = [words for line in self.ask("$G") if (words := replies.parse_modes(line))]
-            reading |= {"$G": tuple(words[-1])} if words else {}
-            for name, value in reading.items():
+            offset_words |= {"$G": tuple(words[-1])} if words else {}
+            for name, value in offset_words.items():
                 last, count = readings.get(name, (None, 0))
                 readings[name] = value, count + 1 if value == last else 1
             if all(readings.get(name, (None, 0))[1] >= 3 for name in _KEPT_PARAMETERS):
@@ -190,7 +190,7 @@ class Session:
     def _drain(self, max_bytes: int, tick: Callable[[], bool]) -> bool:
         """Wait until at most `max_bytes` are unanswered; False if `tick` asked for a stop."""
         last_answer = time_asked = self.port.now()
-        while (waiting := sum(size for size, _ in self._sent)) > max_bytes:
+        while (waiting_bytes := sum(size for size, _ in self._sent)) > max_bytes:
             if tick():
                 return False
             self._not_reset()
@@ -205,7 +205,7 @@ class Session:
             timeout = _HELD_TIMEOUT if state in ("Hold", "Door") else _SILENCE_TIMEOUT
             if self.port.now() > last_answer + timeout + self._dwell_seconds():
                 state_text = f"GRBL on {self.port.name}, in state {state or '?'},"
-                raise LinkError(f"{state_text} has left {waiting} bytes without an answer")
+                raise LinkError(f"{state_text} has left {waiting_bytes} bytes without an answer")
         self._not_reset()
         return True
 
@@ -258,9 +258,11 @@ class Session:
             if self._sent:
                 self._sent.popleft()
         elif match := re.fullmatch(r"error:(\d{1,3})", line):
-            refused = self._sent.popleft()[1] if self._sent else ""
+            refused_line = self._sent.popleft()[1] if self._sent else ""
             number = int(match[1])
-            raise GrblError(f"GRBL refused {refused!r}: {replies.error_text(number)} (error {number})", error=number)
+            raise GrblError(
+                f"GRBL refused {refused_line!r}: {replies.error_text(number)} (error {number})", error=number
+            )
         elif match := re.fullmatch(r"ALARM:(\d{1,3})", line):
             number = int(match[1])
             self._sent.clear()

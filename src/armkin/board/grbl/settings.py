@@ -79,7 +79,7 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
 
     A lower greatest speed or acceleration is not serious, since GRBL is then only slower than planned.
     """
-    differing = []
+    found_differences = []
     for number, (meaning, value) in expected_settings(axes, hal=hal or G92_VOLATILE in actual).items():
         actual_value, own_bits = actual.get(number), _own_bits(number, axes)
         if actual_value is not None and own_bits is not None:
@@ -87,12 +87,12 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
         if actual_value is not None and _is_equal(number, actual_value, value):
             continue
         is_slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
-        differing.append(
+        found_differences.append(
             Difference(
                 number, meaning, actual_value, value, serious=not is_slower and number not in (1, *HOMING_SETTINGS)
             )
         )
-    return differing
+    return found_differences
 
 
 def _own_bits(number: int, axes: Sequence[Axis]) -> int | None:

@@ -128,25 +128,25 @@ def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Differe
     """
     printer = actual.get("printer")
     printer = printer if isinstance(printer, Mapping) else {}
-    differing = []
+    found_differences = []
     kinematics = printer.get("kinematics")
     if kinematics != "none":
-        differing.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
+        found_differences.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
     for option, minimum in (("max_velocity", TIME_RATE), ("max_accel", MAX_ACCEL)):
         value = printer.get(option)
         if not isinstance(value, int | float) or value < minimum:
-            differing.append(Difference(f"[printer] {option}", _value_text(value), f"at least {minimum:g}"))
+            found_differences.append(Difference(f"[printer] {option}", _value_text(value), f"at least {minimum:g}"))
     for axis in axes:
         name = f"[manual_stepper {axis.section}]"
         section = actual.get(name[1:-1])
         if not isinstance(section, Mapping):
-            differing.append(Difference(name, None, f"one for motor {axis.name}"))
+            found_differences.append(Difference(name, None, f"one for motor {axis.name}"))
             continue
         steps = _steps_per_unit(section)
         if steps is None or not math.isclose(steps, axis.steps, rel_tol=1e-9):
             steps_text = None if steps is None else f"{steps:.9g}"
-            differing.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
-    return differing
+            found_differences.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
+    return found_differences
 
 
 def _steps_per_unit(section: Mapping[str, Any]) -> float | None:

@@ -133,13 +133,13 @@ class KlipperMachine(StepperArm):
         lines = trajectory_to_g1_lines.Lines(job, self.axes)
         source = iter(lines)
         self.api.run(trajectory_to_g1_lines.HEAD)
-        start_time, stopping = self.port.now(), False
+        start_time, is_stopping = self.port.now(), False
         while chunk := [line for _, line in zip(range(_CHUNK_LINES), source, strict=False)]:
             self.api.send("gcode/script", {"script": "\n".join(chunk)})
             send_time = start_time + lines.sent - _SPARE_TIME - ramp
-            while self.api.count_waiting() > _MAX_PENDING or (not stopping and self.port.now() < send_time):
-                if not stopping and self._stop():
-                    stopping = True
+            while self.api.count_waiting() > _MAX_PENDING or (not is_stopping and self.port.now() < send_time):
+                if not is_stopping and self._stop():
+                    is_stopping = True
                     lines.brake(ramp)
                 self.api.pump(0.01)
                 report(min(self.port.now() - start_time, job.duration))
@@ -147,7 +147,7 @@ class KlipperMachine(StepperArm):
                     raise LinkError(
                         f"Klipper on {self.port.name} has left {self.api.count_waiting()} requests unanswered"
                     )
-        return not stopping
+        return not is_stopping
 
     def _settle(self) -> None:
         """Wait until all that Klipper holds is done, and read where the arm stands."""
@@ -188,14 +188,16 @@ class KlipperMachine(StepperArm):
         self.settings = _as_dict(objects["configfile"].get("settings"))
         letters = _as_dict(objects["gcode_move"].get("axis_map"))
         values = _axis_places(objects["toolhead"].get("position"), letters, self.axes)
-        enabled = _as_dict(objects["stepper_enable"].get("steppers"))
-        disabled = [axis.section for axis in self.axes if enabled.get(f"manual_stepper {axis.section}") is not True]
+        enable_states = _as_dict(objects["stepper_enable"].get("steppers"))
+        disabled_axes = [
+            axis.section for axis in self.axes if enable_states.get(f"manual_stepper {axis.section}") is not True
+        ]
         if self.state != "ready":
             return f"Klipper is in state {self.state}: {self._message}"
         if values is None:
             return "Klipper does not tell the axes' places: it was restarted, or nobody has said where the arm stands"
-        if disabled:
-            return f"motors are off: {', '.join(disabled)}"
+        if disabled_axes:
+            return f"motors are off: {', '.join(disabled_axes)}"
         self._marks = {f"axis {axis.letter}": f"number {letters[axis.letter]}" for axis in self.axes}
         steps = [(value - axis.at_home) * axis.steps for value, axis in zip(values, self.axes, strict=True)]
         self._counts = np.rint(steps).astype(np.int64)

@@ -56,8 +56,8 @@ class SerialPort:
 
     def _read_some(self) -> bytes:
         received: bytes = self._serial.read(1)
-        while 0 < len(received) < _MAX_READ and (waiting := self._serial.in_waiting):
-            chunk: bytes = self._serial.read(min(waiting, _MAX_READ))
+        while 0 < len(received) < _MAX_READ and (waiting_bytes := self._serial.in_waiting):
+            chunk: bytes = self._serial.read(min(waiting_bytes, _MAX_READ))
             if not chunk:
                 break
             received += chunk

@@ -46,8 +46,8 @@ class SocketPort:
     def read(self, timeout: float) -> bytes:
         """The bytes that have arrived, or arrive within `timeout` seconds."""
         try:
-            ready, _, _ = select.select([self._socket], [], [], max(timeout, 0.0))
-            if not ready:
+            readable, _, _ = select.select([self._socket], [], [], max(timeout, 0.0))
+            if not readable:
                 return b""
             received = self._socket.recv(65_536)
         except (OSError, ValueError) as error:

@@ -94,8 +94,10 @@ class Queue:
         """Steps of every axis in the running segment so far."""
         if not self._queue or not self._queue[0].times:
             return [0] * len(self.axes.base)
-        running = self._queue[0]
-        places = _places_after(running.segment, self._fraction, bisect_right(running.times, self._cycles_run))
+        running_segment = self._queue[0]
+        places = _places_after(
+            running_segment.segment, self._fraction, bisect_right(running_segment.times, self._cycles_run)
+        )
         return [count_at(place) for place in places]
 
     def velocity(self) -> list[float]:
@@ -125,16 +127,16 @@ class Queue:
         """u of PROTOCOL.md, section 7: the time that the arm needs to stop from its present speed."""
         if not self._queue or not self._queue[0].times:
             return 0.0
-        running = self._queue[0]
-        tick = min(bisect_right(running.times, self._cycles_run), len(running.times) - 1)
-        interval = running.times[tick] - (running.times[tick - 1] if tick else 0)
+        running_segment = self._queue[0]
+        tick = min(bisect_right(running_segment.times, self._cycles_run), len(running_segment.times) - 1)
+        interval = running_segment.times[tick] - (running_segment.times[tick - 1] if tick else 0)
         rate = self.clock / (STEP * interval)
-        limits = zip(running.segment.rates, self.axes.image.axes, strict=True)
+        limits = zip(running_segment.segment.rates, self.axes.image.axes, strict=True)
         return max((abs(n) * rate / axis.max_accel for n, axis in limits if n), default=0.0)
 
-    def dry(self, u: float, *, holding: bool = False) -> bool:
+    def dry(self, u: float, *, is_holding: bool = False) -> bool:
         """Whether the queue is just long enough for a stop of u seconds and does not end at rest."""
-        if not self._queue or self._queue[-1].end or (u < _SLOW_STOP and not holding):
+        if not self._queue or self._queue[-1].end or (u < _SLOW_STOP and not is_holding):
             return False
         cycles_left = self._units * 256 - self._cycles_run
         return cycles_left / self.clock < u + u / 32 + 0.002

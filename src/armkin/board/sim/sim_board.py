@@ -81,14 +81,14 @@ class SimBoard:
         at_rest = motors.state == State.IDLE
         motors.cut()
         known_axes, counts = motors.axes.known & ~self.board.servo_mask, motors.axes.base
-        retained = (
+        retained_state = (
             _RetainedState(setup.packed_image(), setup.drivers, known_axes, counts) if at_rest and not power else None
         )
         self._boots = 0 if power else self._boots
         cause = 1 if power else 2
-        self._power_up(0 if self.hidden_cause else cause, motors.axes.net, retained)
+        self._power_up(0 if self.hidden_cause else cause, motors.axes.net, retained_state)
 
-    def _power_up(self, cause: int, net: list[int], retained: _RetainedState | None) -> None:
+    def _power_up(self, cause: int, net: list[int], retained_state: _RetainedState | None) -> None:
         """The board's state after a reset by a cause; what survives it is `retained`."""
         self._splitter = protocol.Splitter(self.board.frame)
         self._error, self._detail = Error.NO_SESSION, 0
@@ -98,10 +98,10 @@ class SimBoard:
         self.setup.reset()
         self.motors = Motors(self.setup, self.inputs.level, self._end_session)
         self.motors.axes.net = list(net)
-        if retained is not None:
-            self.setup.retain(retained.image, retained.drivers)
-            self.motors.axes.known = retained.known
-            self.motors.rest_at(retained.counts)
+        if retained_state is not None:
+            self.setup.retain(retained_state.image, retained_state.drivers)
+            self.motors.axes.known = retained_state.known
+            self.motors.rest_at(retained_state.counts)
         self._commands = Commands(self.setup, self.inputs, self.motors)
 
     def _watch(self) -> None:

@@ -40,12 +40,12 @@ class Block:
     rate: float = 0.0  # [units/s]
     line: bool = True  # False: a dwell, `distance_done` counts seconds up to `length`
 
-    def advance(self, seconds: float, override: int, holding: bool) -> float:
+    def advance(self, seconds: float, override: int, is_holding: bool) -> float:
         """Go on for some seconds; the share of the way that is done."""
         left, change = self.length - self.distance_done, self.accel * seconds
         speed = min(self.feed * override / 100, self.most)
-        if holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
-            self.rate = max(0.0 if holding else change, self.rate - change)
+        if is_holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
+            self.rate = max(0.0 if is_holding else change, self.rate - change)
         else:
             self.rate = min(speed, self.rate + change)
         self.distance_done = min(self.length, self.distance_done + self.rate * seconds)
@@ -310,11 +310,11 @@ class Grbl(SimulatedTime):
         if "F" not in words.values:
             return 22
         modes = self.modes
-        saved = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
+        saved_modes = modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse
         line_words = Words(words.codes | {1.0, 94.0}, None, words.values)
         goal = modes.obey(line_words, _machine_position(self.settings, position))
         feed = modes.feed
-        modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = saved
+        modes.unit, modes.relative, modes.motion, modes.feed, modes.inverse = saved_modes
         if goal is not None:
             self._plan_block(position, goal, feed)
         return 0

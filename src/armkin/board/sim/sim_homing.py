@@ -56,11 +56,11 @@ class Homing:
             self.latched = True
 
     def _find_edge(
-        self, search: Search, vector: list[int], share: float, pressed: bool, limit: int, error: Error
+        self, search: Search, vector: list[int], share: float, want_pressed: bool, limit: int, error: Error
     ) -> Generator[None, None, bool]:
         """Move until the switch is steadily pressed, or released."""
         self._switch_time = -1.0
-        return self._slide(vector, share, lambda: self._is_steady(search, pressed), limit, error)
+        return self._slide(vector, share, lambda: self._is_steady(search, want_pressed), limit, error)
 
     def _slide(
         self, vector: list[int], share: float, finished: Callable[[], bool], limit: int, error: Error
@@ -86,10 +86,10 @@ class Homing:
     def _is_pressed(self, search: Search) -> bool:
         return self._level(search.switch) == search.closed
 
-    def _is_steady(self, search: Search, pressed: bool) -> bool:
+    def _is_steady(self, search: Search, want_pressed: bool) -> bool:
         """Whether the switch has had a level for long enough; latches the counts of the change."""
         present = self._cruise.now
-        if self._is_pressed(search) != pressed:
+        if self._is_pressed(search) != want_pressed:
             self._switch_time = -1.0
         elif self._switch_time < 0:
             self._switch_time, self._switch_counts = present, list(self._cruise.axes.base)

@@ -103,7 +103,7 @@ class Motors:
             if self.state == State.MOVING and self.queue.dry(self.queue.stop_time()):
                 self._fault(Error.DRY)
         elif self.state == State.HOLDING:
-            if self.queue.dry(self._hold, holding=True):
+            if self.queue.dry(self._hold, is_holding=True):
                 self._brake = 1.0
             self._hold -= seconds * self._brake
             plan = self.queue.stop_time()
@@ -121,8 +121,8 @@ class Motors:
             self._fault(Error.DRY)
         self._stop_at_rest()
 
-    def _begin(self, state: State, cruising: Iterator[None]) -> None:
-        self.state, self._cruising = state, cruising
+    def _begin(self, state: State, cruise_steps: Iterator[None]) -> None:
+        self.state, self._cruising = state, cruise_steps
         self.cruise.stopped = False
 
     def _stop_at_rest(self) -> None:

@@ -47,8 +47,8 @@ def port_name(port: str | None, board: Board, baud: int | None, *, reset: bool =
     from armkin.board.stop_signals import stoppable
 
     with stoppable() as stop:
-        answering = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
-    return only_port(answering, board.called, board.hint)
+        answering_ports = [name for name in board.likely() if board.answers(name, baud, stop, reset=reset)]
+    return only_port(answering_ports, board.called, board.hint)
 
 
 def only_port(ports: Sequence[str], called: str, hint: str = "armkin ports lists them", *, asked: bool = True) -> str:

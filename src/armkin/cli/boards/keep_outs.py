@@ -40,9 +40,9 @@ def mark_ignored(arm: Arm, ignore: bool) -> Arm:
 
     from armkin.keep_out.clearance import assumed_radii
 
-    if guessed := assumed_radii(arm):
-        names = ", ".join(name for name, _ in guessed)
-        output.note(f"no file states the radius of {names}: {guessed[0][1]:.4g} mm are assumed, 2 % of the reach")
+    if guessed_radii := assumed_radii(arm):
+        names = ", ".join(name for name, _ in guessed_radii)
+        output.note(f"no file states the radius of {names}: {guessed_radii[0][1]:.4g} mm are assumed, 2 % of the reach")
     return replace(arm, ignores_keep_out=True) if ignore else arm
 
 
@@ -95,6 +95,8 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
         for k in np.flatnonzero(least_clearances < 0).tolist():
             deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-least_clearances[k]))
     if deepest:
-        ordered = sorted(deepest.items(), key=lambda item: -item[1])
-        words = hits_text([{"body": body, "with": obstacle, "depth_mm": depth} for (body, obstacle), depth in ordered])
+        deepest_first = sorted(deepest.items(), key=lambda item: -item[1])
+        words = hits_text(
+            [{"body": body, "with": obstacle, "depth_mm": depth} for (body, obstacle), depth in deepest_first]
+        )
         output.warn(f"--ignore-keep-out: this motion {words}")

@@ -22,7 +22,7 @@ def add_trace_option(command: Callable[..., Any]) -> Callable[..., Any]:
         return command
     hints = get_type_hints(command, include_extras=True)
     command_signature = signature(command)
-    resolved = command_signature.replace(
+    resolved_signature = command_signature.replace(
         parameters=[option.replace(annotation=hints[name]) for name, option in command_signature.parameters.items()]
     )
 
@@ -33,10 +33,10 @@ def add_trace_option(command: Callable[..., Any]) -> Callable[..., Any]:
         with BoardLog():
             return command(*words, **options)
 
-    option = Log if "trace" in resolved.parameters else Trace
-    added = Parameter("log", Parameter.KEYWORD_ONLY, default=False, annotation=option)
+    option = Log if "trace" in resolved_signature.parameters else Trace
+    log_parameter = Parameter("log", Parameter.KEYWORD_ONLY, default=False, annotation=option)
     run.__annotations__ = {**hints, "log": option}
-    run.__signature__ = resolved.replace(parameters=[*resolved.parameters.values(), added])  # type: ignore[attr-defined]
+    run.__signature__ = resolved_signature.replace(parameters=[*resolved_signature.parameters.values(), log_parameter])  # type: ignore[attr-defined]
     return run
 
 

@@ -123,13 +123,13 @@ def _print_suggestions(arm: Arm, count: int, rows: Array | None, kinds: list[str
     from armkin.columns.csv_cells import csv_line
 
     measured_q = None if rows is None else units.joints_in(arm, rows[:, : arm.n])
-    suggested = units.joints_out(arm, next_poses(arm, count, measured_q, fix=kinds)).round(9).tolist()
+    poses = units.joints_out(arm, next_poses(arm, count, measured_q, fix=kinds)).round(9).tolist()
     with output.destination(out) as write:
         if json:
-            answer = {**render.head(arm), "joint_units": units.unit_names(arm), "poses": suggested}
+            answer = {**render.head(arm), "joint_units": units.unit_names(arm), "poses": poses}
             write(f"{render.to_json(answer)}\n")
         else:
-            write("\n".join([csv_line(arm.joint_names), *map(csv_line, suggested), ""]))
+            write("\n".join([csv_line(arm.joint_names), *map(csv_line, poses), ""]))
 
 
 def _answer(arm: Arm, calibration: Calibration, numbers: list[int], out: str | None) -> dict[str, Any]:
@@ -176,8 +176,8 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
         rows.append(
             [name, render.fixed_text(answer["before"][key], 3), render.fixed_text(answer["after"][key], 3), "mm"]
         )
-    corrected = "corrected: " + (", ".join(answer["corrected"]) or "nothing, the file is as good")
-    lines = [f"{arm.name}: {answer['rows']} measured poses, {corrected}", "", render.table(rows, (0, 3)), ""]
+    corrected_text = "corrected: " + (", ".join(answer["corrected"]) or "nothing, the file is as good")
+    lines = [f"{arm.name}: {answer['rows']} measured poses, {corrected_text}", "", render.table(rows, (0, 3)), ""]
     if answer["corrections"]:
         table = [["correction", "value", "+-", ""]]
         for entry in answer["corrections"]:
@@ -191,7 +191,7 @@ def _text(arm: Arm, answer: dict[str, Any]) -> str:
     if flagged := answer["flagged"]:
         rows_text = ", ".join(f"{entry['row']} ({entry['off_mm']:.1f} mm)" for entry in flagged)
         lines.append(render.wrap_text(rows_text, "rows left out: ", " " * 15))
-    if unseen := answer["unseen"]:
-        lines.append(render.wrap_text(", ".join(unseen), "not seen in these rows: ", " " * 24))
+    if unseen_corrections := answer["unseen"]:
+        lines.append(render.wrap_text(", ".join(unseen_corrections), "not seen in these rows: ", " " * 24))
     lines.append(f"noise of a measured coordinate: {answer['noise_mm']:.3f} mm")
     return "\n".join(lines) + "\n"

@@ -47,8 +47,8 @@ def flash(
     program = image(kind)
     port = port or _only_port(kind)
     with output.progress("bytes out and back") as tick:
-        flashed = upload(program, port, tick)
-    answer: dict[str, object] = {"board": kind, **flashed._asdict()}
+        flash_result = upload(program, port, tick)
+    answer: dict[str, object] = {"board": kind, **flash_result._asdict()}
     with output.destination(None) as write:
         write(render.to_json(answer) + "\n" if json else _text(answer))
 

@@ -45,31 +45,31 @@ def grip(
     target = _gripper_value(board, value, "VALUE")
     start = None if assume is None else _gripper_value(board, assume, "--assume")
     with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
-        gripped = board.grip(target, start)
-    if gripped.counts is not None and gripped.position != gripped.target:
+        grip_result = board.grip(target, start)
+    if grip_result.counts is not None and grip_result.position != grip_result.target:
         raise LinkError(
-            f"the gripper stands at {render.short_text(gripped.position)} instead of "
-            f"{render.short_text(gripped.target)} {gripped.unit}: please report this as a bug"
+            f"the gripper stands at {render.short_text(grip_result.position)} instead of "
+            f"{render.short_text(grip_result.target)} {grip_result.unit}: please report this as a bug"
         )
-    answer: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": gripped.position}
-    if gripped.counts is None:
-        answer |= {"target": gripped.target, "measured": gripped.measured}
+    answer: dict[str, Any] = {**render.head(arm), "port": machine.port.name, "gripper": grip_result.position}
+    if grip_result.counts is None:
+        answer |= {"target": grip_result.target, "measured": grip_result.measured}
     else:
-        answer["counts"] = gripped.counts
+        answer["counts"] = grip_result.counts
     with output.destination(None) as write:
-        write(render.to_json(answer) + "\n" if json else f"gripper: {_rest_text(gripped)}\n")
+        write(render.to_json(answer) + "\n" if json else f"gripper: {_rest_text(grip_result)}\n")
 
 
-def _rest_text(gripped: Gripped) -> str:
+def _rest_text(grip_result: Gripped) -> str:
     """Where a gripper has come to rest, in words: ``29.97 deg (833 us)``."""
-    text = f"{render.short_text(gripped.position)} {gripped.unit}"
-    if gripped.counts is not None:
-        return f"{text} ({gripped.counts} {gripped.count_unit})"
-    if not gripped.measured:
+    text = f"{render.short_text(grip_result.position)} {grip_result.unit}"
+    if grip_result.counts is not None:
+        return f"{text} ({grip_result.counts} {grip_result.count_unit})"
+    if not grip_result.measured:
         return f"{text}, as sent: nothing measures it"
-    if abs(gripped.position - gripped.target) < 1.5:
+    if abs(grip_result.position - grip_result.target) < 1.5:
         return text
-    return f"{text} of {render.short_text(gripped.target)}: it holds something, or is blocked"
+    return f"{text} of {render.short_text(grip_result.target)}: it holds something, or is blocked"
 
 
 def _gripper_value(board: Board, text: str, option: str) -> str | float:

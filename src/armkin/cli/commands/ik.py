@@ -90,10 +90,10 @@ def ik(
     from armkin.inverse.tasks.choose_task import task_for
 
     _check_together(batch, sweep, position_first=position_first, compiled=compiled, continuous=continuous)
-    piped = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
-    arm = arguments.load_arm(arguments.required_robot(robot), scene, tool) if piped is None else piped[0]
+    piped_joints = None if target or batch is not None else piped_answers.joint_values(robot, scene, tool)
+    arm = arguments.load_arm(arguments.required_robot(robot), scene, tool) if piped_joints is None else piped_joints[0]
     chosen_task = task_for(arm, task)
-    targets_of_pulses = None if piped is None else _reached_targets(arm, chosen_task, piped[1])
+    targets_of_pulses = None if piped_joints is None else _reached_targets(arm, chosen_task, piped_joints[1])
     held = lock_and_sweep.locked_values(arm, lock)
     request = choose_branch.Request(
         arm=arm,

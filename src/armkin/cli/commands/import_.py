@@ -47,24 +47,24 @@ def import_(
     files.protect_input(file)
     try:
         raw = urdf_reader.read_bytes(file)  # once: a pipe can be read no second time
-        imported = urdf_reader.parse_urdf(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
+        urdf_robot = urdf_reader.parse_urdf(raw, "stdin" if file == "-" else file, base=base, tip=tip, snap=snap)
     except UsageError as error:
         option = next((end for end in ("base", "tip") if f"the {end} must be named" in str(error)), None)
         if option is None:
             raise
         raise UsageError(f"{error}\ngive it with --{option} LINK") from None
-    arm = arm_of_file(robot_file.parse_robot_file(format_robot_file(imported.data), f"{file} as a robot file"))
-    document: dict[str, Any] = conventions.dh(arm) if dh else imported.data
+    arm = arm_of_file(robot_file.parse_robot_file(format_robot_file(urdf_robot.data), f"{file} as a robot file"))
+    document: dict[str, Any] = conventions.dh(arm) if dh else urdf_robot.data
     with output.destination(out) as write:
-        write(format_robot_file(document, imported.notes))
-    for note in imported.notes:
+        write(format_robot_file(document, urdf_robot.notes))
+    for note in urdf_robot.notes:
         output.note(note)
-    output.note(f"{arm.n} joints from {imported.base} to {imported.tip}")
-    if not snap and (gain := _snap_gain(raw, imported, arm)):
+    output.note(f"{arm.n} joints from {urdf_robot.base} to {urdf_robot.tip}")
+    if not snap and (gain := _snap_gain(raw, urdf_robot, arm)):
         output.note(gain)
 
 
-def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
+def _snap_gain(raw: bytes, urdf_robot: UrdfRobot, arm: Arm) -> str | None:
     """What --snap would buy: another solver class, and how far the tip would move for it."""
     import numpy as np
 
@@ -75,7 +75,7 @@ def _snap_gain(raw: bytes, imported: UrdfRobot, arm: Arm) -> str | None:
 
     snapped_arm = arm_of_file(
         robot_file.parse_robot_file(
-            format_robot_file(urdf_reader.parse_urdf(raw, base=imported.base, tip=imported.tip, snap=True).data)
+            format_robot_file(urdf_reader.parse_urdf(raw, base=urdf_robot.base, tip=urdf_robot.tip, snap=True).data)
         )
     )
     try:

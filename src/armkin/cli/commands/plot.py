@@ -119,12 +119,12 @@ def _draw_piped(robot: str | None, scene: str | None, out: str | None, **style: 
     """What a command before the pipe has printed: its branches, or its poses."""
     from armkin.plot import plot_poses
 
-    piped = piped_answers.answers(robot, scene)
-    if piped is None:
+    arm_and_answers = piped_answers.answers(robot, scene)
+    if arm_and_answers is None:
         arm = arguments.load_arm(arguments.required_robot(robot), scene)
         names = " ".join(arm.joint_names)
         raise UsageError(f"nothing to draw: give joint values ({names}), a pose's name, --target or --batch")
-    arm, answers = piped
+    arm, answers = arm_and_answers
     if len(answers) == 1 and len(answers[0].get("branches") or ()) > 1:
         branches = answers[0]["branches"]
         q = units.joints_in(arm, [branch["joints"] for branch in branches])

@@ -34,7 +34,7 @@ def _robot_entry(name: str) -> ShippedRobot:
     from armkin.board.backend.missing_keys import missing_by_command
 
     arm = armkin.load(name)
-    task, labels, refused = _task_and_target(arm)
+    task, labels, refusals = _task_and_target(arm)
     lacks = missing_by_command(arm)
     return {
         **render.head(arm),
@@ -43,8 +43,8 @@ def _robot_entry(name: str) -> ShippedRobot:
         "joint_types": ["prismatic" if is_prismatic else "revolute" for is_prismatic in arm.prismatic],
         "task": task,
         "target_labels": labels,
-        "can": {"ik": not refused, **{command: not lacks[command] for command in _CAPABILITIES[1:]}},
-        "lacks": {"ik": refused, **lacks},
+        "can": {"ik": not refusals, **{command: not lacks[command] for command in _CAPABILITIES[1:]}},
+        "lacks": {"ik": refusals, **lacks},
         "compared": "" if arm.file is None else arm.file.compared,
     }
 
@@ -69,6 +69,6 @@ def _text(robots: list[ShippedRobot]) -> str:
         marks = ["yes" if entry["can"][command] else "-" for command in _CAPABILITIES]
         if entry["task"] is not None and not entry["can"]["ik"]:
             marks[0] = "--lock"
-        compared = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"
-        rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks, compared])
+        comparison = "URDF only" if entry["compared"].startswith("only its own URDF") else "yes"
+        rows.append([entry["robot"], kinds, entry["task"] or "-", " ".join(entry["target_labels"]), *marks, comparison])
     return render.table(rows, left_aligned=range(10), indent="") + "\n"

@@ -241,9 +241,13 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
     begin = arm.home if start is None else board_link.standing_joints(arm, start, "--from")
     plans = _all_plans(planner, goals, planner.counts(begin))
     _write_trace(arm, plans, trace)
-    summed = Total(arm, plans).summary()
+    plan_totals = Total(arm, plans).summary()
     with output.answer_stream(trace) as write:
-        write(render.to_json({**render.head(arm), "dry_run": True, **summed}) + "\n" if json else _text(arm, summed))
+        write(
+            render.to_json({**render.head(arm), "dry_run": True, **plan_totals}) + "\n"
+            if json
+            else _text(arm, plan_totals)
+        )
 
 
 def _carry_out(planner: Planner, plans: Sequence[Planned], held: Any) -> None:

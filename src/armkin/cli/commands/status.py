@@ -77,10 +77,10 @@ def _print_changes(texts: Iterator[str]) -> None:
     from rich.text import Text
 
     last_text = ""
-    with Live(auto_refresh=False) as live:
+    with Live(auto_refresh=False) as live_display:
         for text in texts:
             if text != last_text:  # drawing what stands there makes it flicker
-                live.update(Text(text.rstrip()), refresh=True)
+                live_display.update(Text(text.rstrip()), refresh=True)
             last_text = text
 
 

@@ -313,7 +313,7 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
     import numpy as np
 
     index: list[int] = []
-    parsed: list[list[float]] = []
+    parsed_rows: list[list[float]] = []
     problem: UsageError | None = None
     begin, number, is_tried = 0, first, False
     while begin < len(text):
@@ -322,8 +322,8 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
             if values is not None:
                 rows_left = range(number, number + len(values))
                 yield (
-                    Chunk([*index, *rows_left], np.concatenate([parsed, values]))
-                    if parsed
+                    Chunk([*index, *rows_left], np.concatenate([parsed_rows, values]))
+                    if parsed_rows
                     else Chunk(rows_left, values)
                 )
                 return
@@ -335,10 +335,10 @@ def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator
             break
         if row is not None:
             index.append(number)
-            parsed.append(row)
+            parsed_rows.append(row)
         begin, number = end, number + 1
-    if parsed:
-        yield Chunk(index, np.array(parsed))
+    if parsed_rows:
+        yield Chunk(index, np.array(parsed_rows))
     if problem is not None:
         raise problem
 

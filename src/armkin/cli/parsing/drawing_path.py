@@ -45,8 +45,8 @@ def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Place
     from armkin.motion.drawings import drawing
 
     if file is None or path_file.drawing_language(file) is None:
-        if given := [name for name, value in placement._asdict().items() if value is not None]:
-            option = "--" + given[0].replace("_", "-")
+        if given_names := [name for name, value in placement._asdict().items() if value is not None]:
+            option = "--" + given_names[0].replace("_", "-")
             raise UsageError(f"{option} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
         return None
     at, scale, feed, lift, grip_by = placement

@@ -83,8 +83,8 @@ def arm_and_poses(
     robot: str | None, words: Sequence[str] | None, scene: str | None = None, tool: str | None = None
 ) -> tuple[Arm, list[list[float]]]:
     """The arm and joint values [deg | mm]: the command line's, or those of an answer on standard input."""
-    if not words and (piped := joint_values(robot, scene, tool)) is not None:
-        return piped
+    if not words and (arm_and_joints := joint_values(robot, scene, tool)) is not None:
+        return arm_and_joints
     arm = arguments.load_arm(arguments.required_robot(robot), scene, tool)
     return arm, [arguments.joints(arm, words)]
 
@@ -97,21 +97,21 @@ def joint_values(
     robot: a robot given as well, which must be the same. None if there is a robot and nothing on standard
     input. Answers of ik without a branch within limits are skipped, with a warning.
     """
-    piped = answers(robot, scene, tool)
-    if piped is None:
+    arm_and_answers = answers(robot, scene, tool)
+    if arm_and_answers is None:
         return None
-    arm, parsed = piped
-    return arm, joints_of(arm, parsed)
+    arm, answer_list = arm_and_answers
+    return arm, joints_of(arm, answer_list)
 
 
-def joints_of(arm: Arm, parsed: Sequence[dict[str, Any]]) -> list[list[float]]:
+def joints_of(arm: Arm, answer_list: Sequence[dict[str, Any]]) -> list[list[float]]:
     """Joint values [deg | mm] of answers; those without a branch within limits are skipped, with a warning."""
-    values = [_answer_joints(answer, arm) for answer in parsed if not _is_unsolved(answer)]
-    if len(values) < len(parsed):
-        skipped = f"{len(parsed) - len(values)} of {len(parsed)} answers have no branch within limits"
+    values = [_answer_joints(answer, arm) for answer in answer_list if not _is_unsolved(answer)]
+    if len(values) < len(answer_list):
+        count_text = f"{len(answer_list) - len(values)} of {len(answer_list)} answers have no branch within limits"
         if not values:
-            raise NoSolutionError(f"{skipped}: there are no joint values on standard input")
-        output.warn(f"{skipped}: skipped")
+            raise NoSolutionError(f"{count_text}: there are no joint values on standard input")
+        output.warn(f"{count_text}: skipped")
     return values
 
 
@@ -124,13 +124,13 @@ def answers(
         arguments.required_robot(robot)
         return None
     try:
-        parsed = [_parse_answer(part) for part in _json_parts(text)]
+        answer_list = [_parse_answer(part) for part in _json_parts(text)]
     except UsageError:
         if robot is None or text.lstrip()[:1] == "{":
             raise
         raise UsageError("standard input is no JSON; for rows of CSV add --batch -") from None
-    arm = arguments.load_arm(robot or parsed[0]["robot_file"], scene, tool)
-    for answer in parsed:
+    arm = arguments.load_arm(robot or answer_list[0]["robot_file"], scene, tool)
+    for answer in answer_list:
         if answer["robot_sha256"] != arm.sha256:
             name = answer["robot_file"]
             if answer.get("robot", arm.name) != arm.name:
@@ -138,7 +138,7 @@ def answers(
                     f"the answer on standard input is of {answer['robot']}, and the command is for {arm.name}"
                 )
             raise FileError(f"the answer on standard input was computed with another {name}, or it has changed since")
-    return arm, parsed
+    return arm, answer_list
 
 
 def _stdin_text() -> str:

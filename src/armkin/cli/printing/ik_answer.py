@@ -80,18 +80,18 @@ def closest_pose(
 
     arm = request.arm
     if chosen_answer.branches and chosen_answer.branches[0].within_limits:  # only the branch asked for is outside
-        legal = chosen_answer.branches[0]
-        if legal.hits:
+        best_branch = chosen_answer.branches[0]
+        if best_branch.hits:
             return None
         answer: Closest = {
-            "joints": legal.joints,
-            "position_mm": (armkin.fk(arm, legal.q)[:3, 3] + 0.0).tolist(),
-            "distance_mm": legal.residual_mm,
-            "angle_deg": legal.residual_deg,
+            "joints": best_branch.joints,
+            "position_mm": (armkin.fk(arm, best_branch.q)[:3, 3] + 0.0).tolist(),
+            "distance_mm": best_branch.residual_mm,
+            "angle_deg": best_branch.residual_deg,
             "converged": True,
-            "branch": legal.name,
+            "branch": best_branch.name,
         }
-        answer.update(_near_to(arm, legal))
+        answer.update(_near_to(arm, best_branch))
         return answer
     if nearest is None:
         [nearest] = choose_branch.closest(request, goal[None])

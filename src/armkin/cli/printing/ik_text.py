@@ -57,8 +57,8 @@ def _turned_text(angle_deg: float) -> str:
 
 def _summary(answer: Ik) -> str:
     """What the table does not show: how many branches there are, and by which method."""
-    count, legal = answer["branch_count"], answer["branches_within_limits"]
-    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal} within limits"
+    count, legal_count = answer["branch_count"], answer["branches_within_limits"]
+    text = f"{answer['status']}: {count} branch{'es' * (count != 1)}, {legal_count} within limits"
     if "branches_free" in answer:
         text += f", {answer['branches_free']} free"
     if answer["free_joints"]:

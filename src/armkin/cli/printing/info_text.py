@@ -242,8 +242,8 @@ def _lacks_text(lacks: dict[str, list[str]], add: list[str]) -> str:
     builds_on = {"send": "simulate", "home": "send"}
     lines = []
     for name, words in rows.items():
-        inherited = ["the same"] if name in builds_on and lacks[builds_on[name]] else []
-        text = f"not yet: {'; '.join(inherited + words)}" if inherited or words else "ready"
+        builds_on_words = ["the same"] if name in builds_on and lacks[builds_on[name]] else []
+        text = f"not yet: {'; '.join(builds_on_words + words)}" if builds_on_words or words else "ready"
         lines.append(wrap_text(text, f"  {name:9}", " " * 11))
     if add:
         lines += ["", "  to add, with your arm's figures, for send:", *(f"    {line}" for line in add)]

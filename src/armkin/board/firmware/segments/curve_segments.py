@@ -199,13 +199,13 @@ class CurveSegments:
         arm, dq, ddq = self.arm, self.stretch.evaluate(t, 1), self.stretch.evaluate(t, 2)
         stop = (np.abs(dq @ arm.motor_gain.T) / motor_accel(arm)).max(axis=1)
         lever = np.abs(arm.ratio) * np.where(arm.prismatic, 1.0, arm.reach)
-        limited = np.flatnonzero(np.abs(ddq) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
-        J = jacobian(arm, self.stretch.evaluate(t[limited]))[:, :3]
-        v, accel = ((J @ x[limited, :, None])[..., 0] for x in (dq, ddq))
+        limited_rows = np.flatnonzero(np.abs(ddq) @ lever > 8 * self.tolerance / _MAX_SECONDS**2)
+        J = jacobian(arm, self.stretch.evaluate(t[limited_rows]))[:, :3]
+        v, accel = ((J @ x[limited_rows, :, None])[..., 0] for x in (dq, ddq))
         tangent = v / np.maximum(np.linalg.norm(v, axis=1, keepdims=True), 1e-9)
         normal_accel = np.linalg.norm(accel - tangent * (tangent * accel).sum(axis=1, keepdims=True), axis=1)
         span = np.full(len(t), np.inf)
-        span[limited] = np.sqrt(8 * self.tolerance / np.maximum(normal_accel, 1e-9))
+        span[limited_rows] = np.sqrt(8 * self.tolerance / np.maximum(normal_accel, 1e-9))
         return span, stop
 
 
@@ -214,12 +214,14 @@ def _least_spans(stop: Array, step: float) -> Array:
 
     A stopping time u at some moment applies to all segments within the following time u.
     """
-    needed = stop / _QUEUED_SEGMENTS
-    shortest = needed.copy()
-    if float(needed.max(initial=0.0)) <= _MIN_SECONDS:  # segments are never shorter
+    needed_spans = stop / _QUEUED_SEGMENTS
+    shortest = needed_spans.copy()
+    if float(needed_spans.max(initial=0.0)) <= _MIN_SECONDS:  # segments are never shorter
         return shortest
     for shift in range(1, min(int(stop.max(initial=0.0) / step) + 1, len(stop))):
-        shortest[shift:] = np.maximum(shortest[shift:], np.where(stop[:-shift] >= shift * step, needed[:-shift], 0.0))
+        shortest[shift:] = np.maximum(
+            shortest[shift:], np.where(stop[:-shift] >= shift * step, needed_spans[:-shift], 0.0)
+        )
     return shortest
 
 

@@ -221,12 +221,12 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
     They come in blocks, each beginning with the last bound of the one before, with a flag for the last block.
     """
     bounds_left = iter(bounds)
-    pending: list[float] = []
+    pending_times: list[float] = []
     begin = 0.0
     while True:
         block = list(islice(bounds_left, _MAX_BOUNDS))
-        pending += block
-        times = np.array(pending)
+        pending_times += block
+        times = np.array(pending_times)
         if len(times) > 2:
             position, speed = law.evaluate(times) / law.length * steps, law.evaluate(times, 1) / law.length * steps
             steps_beside = np.minimum(np.diff(position)[:-1], np.diff(position)[1:])
@@ -238,4 +238,4 @@ def _on_steps(law: Profile, bounds: Iterable[float], steps: int) -> Iterator[tup
             return
         yield times[:-1], False  # moving the last bound needs the next one
         begin = float(times[-2])
-        pending = pending[-2:]
+        pending_times = pending_times[-2:]

@@ -156,7 +156,7 @@ class Window:
         """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
-    def acknowledge(self, reply: Ack | Status, requested: float = 0.0) -> int:
+    def acknowledge(self, reply: Ack | Status, time_asked: float = 0.0) -> int:
         """Process a reply's `next` and `free`, and count the frames that it acknowledges; requested: request time."""
         count = (reply.next - self._next) & 255
         if count > len(self._sent):
@@ -168,7 +168,7 @@ class Window:
             self._line.clear, self._gap = max(self._line.clear, self._line.port.now()), False
             self._bytes = _MAX_BYTES[0] if self._line.noisy else min(_MAX_BYTES[1], self._bytes + 20)
         elif self._sent and (
-            type(reply) is Ack or requested > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
+            type(reply) is Ack or time_asked > self._sent_at or (reply.detail == Error.SPILL and not reply.error)
         ):
             self._gap = True  # a later frame has arrived and the first has not
         return count

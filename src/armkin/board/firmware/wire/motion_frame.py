@@ -33,8 +33,8 @@ def motion(
     """
     k = len(axes)
     wide = wide or not all(segment.narrow for segment in segments)
-    gentle = round((1.0 - brake) * GENTLE_PARTS)
-    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle << MOTION_GENTLE
+    gentle_parts = round((1.0 - brake) * GENTLE_PARTS)
+    flags = (MOTION_END if at_rest else 0) | (MOTION_WIDE if wide else 0) | gentle_parts << MOTION_GENTLE
     head = struct.pack(f"<BBHBB{k}i{k}i", Type.MOTION, tag, mask_of(axes), flags, len(segments), *start, *end)
     return head + b"".join(pack_segment(segment, axes, wide=wide) for segment in segments)
 

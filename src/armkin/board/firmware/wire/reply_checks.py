@@ -93,7 +93,7 @@ def check_session(digest: int, expected: int, port: str) -> None:
         )
 
 
-def check_next(acknowledged: int, sent: int, port: str) -> None:
+def check_next(acknowledged_count: int, sent_count: int, port: str) -> None:
     """Raise BoardSaysError for a `next` that runs ahead of what was sent, or back behind what was acknowledged."""
-    if acknowledged > sent:
-        raise _impossible_value_error(port, "next", f"{acknowledged} ahead", f"0 to {sent}")
+    if acknowledged_count > sent_count:
+        raise _impossible_value_error(port, "next", f"{acknowledged_count} ahead", f"0 to {sent_count}")

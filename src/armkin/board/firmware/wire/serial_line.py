@@ -27,8 +27,8 @@ class Line:
     @property
     def noisy(self) -> bool:
         """Whether so much is damaged that short frames, each sent several times, are faster."""
-        damaged = self.splitter.bad + self.resent
-        return damaged > max(1.0, 0.03 * self._written)
+        damaged_frames = self.splitter.bad + self.resent
+        return damaged_frames > max(1.0, 0.03 * self._written)
 
     @property
     def damaged(self) -> bool:

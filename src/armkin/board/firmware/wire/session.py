@@ -317,15 +317,15 @@ def _silence_error(port: Port) -> LinkError:
     )
 
 
-def _no_board(port: Port, heard: bytes, damaged: bool) -> LinkError:
+def _no_board(port: Port, heard_bytes: bytes, has_damage: bool) -> LinkError:
     """The error of a port without a board that speaks this protocol.
 
     heard: bytes received between two tries; damaged: whether damaged frames were received.
     """
     port_text = f"{port.name} ({port.baud} baud)"
-    if b"grbl" in heard.lower():
+    if b"grbl" in heard_bytes.lower():
         text = f"GRBL answers on {port_text}: its robot file says board: {{kind: grbl}}"
-    elif heard or damaged:
+    elif heard_bytes or has_damage:
         text = f"something answers on {port_text}, but not in this protocol: is armkin's firmware flashed?"
     else:
         text = f"no board answers on {port_text}: is armkin's firmware flashed?"
