@@ -172,9 +172,9 @@ def legal_with_same_pulses(arm: Arm, q: ArrayLike) -> Array:
     q: (..., n) [rad | mm]. Returns (..., n); q itself where its nearest legal values have other pulses.
     """
     values = np.asarray(q, dtype=float)
-    clipped = np.clip(values, arm.lower, arm.upper)
-    has_same_pulses = (pulses(arm, clipped) == pulses(arm, values)).all(axis=-1, keepdims=True)
-    return np.where(has_same_pulses, clipped, values)
+    clipped_values = np.clip(values, arm.lower, arm.upper)
+    has_same_pulses = (pulses(arm, clipped_values) == pulses(arm, values)).all(axis=-1, keepdims=True)
+    return np.where(has_same_pulses, clipped_values, values)
 
 
 def rounding(arm: Arm, q: ArrayLike, p: ArrayLike | None = None) -> Rounding:

@@ -91,11 +91,11 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
         parts += [_joint_loop("Least clearances and their pairs", "arm_clearance", 2)]
     if branches:
         assert task is not None
-        accepted = ACCEPTED**2
+        max_residual = ACCEPTED**2
         if geometry is not None and geometry.pairs is None:
             # the elimination has its own threshold
-            accepted, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(POSES)
-        fields |= _task_fields(arm, task, branches, accepted)
+            max_residual, level, fields["lanes"] = c_elimination.ACCEPTED, 2, str(POSES)
+        fields |= _task_fields(arm, task, branches, max_residual)
         # unordered branches are numbered by their columns until `follow_branches` sorts them along a path
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
@@ -125,7 +125,7 @@ def has_rows(task: Task, geometry: Geometry | None) -> bool:
     return geometry is not None and geometry.pairs is None and task.orientation == "full"
 
 
-def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[str, str]:
+def _task_fields(arm: Arm, task: Task, branches: int, max_residual: float) -> dict[str, str]:
     """Values of the fields in the parts of `ik`."""
     bounds = ["ARM_FARTHEST"] * task.position + ["ARM_WILD"] * len(task.sums)
     if task.orientation == "axis":
@@ -134,7 +134,7 @@ def _task_fields(arm: Arm, task: Task, branches: int, accepted: float) -> dict[s
         "branches": str(branches),
         "target": str(c_program.target_size(task)),
         "goal": str(arm_formulas.goal_size(task)),
-        "accepted": number_text(accepted),
+        "accepted": number_text(max_residual),
         "room": number_text(ROOM * arm.reach),
         "coarse": number_text(COARSE_ROOM * arm.reach),
         "close": ", ".join(number_text(STANDING_DISTANCE * unit) for unit in radian_or_reach(arm).tolist()),

@@ -59,6 +59,6 @@ class JointFunctions:
             return int(call(rows.stop - rows.start, *pointers))
 
         if sum(share_rows(run_part, len(rows_of_q), workers, THREAD_POSES)):
-            refused = np.flatnonzero(is_refused)
-            results[refused] = python(self.arm, rows_of_q[refused])
+            refused_rows = np.flatnonzero(is_refused)
+            results[refused_rows] = python(self.arm, rows_of_q[refused_rows])
         return results.reshape(*values.shape[:-1], *shape)

@@ -19,11 +19,11 @@ SPARE_CHARACTERS = 64  # characters that C may write after the last one
 BLOCK_ROWS = 4_096  # rows printed together, so that their text fits the cache
 
 
-def table_lines(table: Table, separators: list[str], quoted: Callable[[Any], str], missing_text: str) -> bytes:
+def table_lines(table: Table, separators: list[str], quote: Callable[[Any], str], missing_text: str) -> bytes:
     """See `armkin.columns.csv_and_json_lines.Lines`."""
     count = row_count(table)
     print_rows = _library()
-    texts = [_column_words(column, quoted) for column in table.values()]
+    texts = [_column_words(column, quote) for column in table.values()]
     cells = [[separator, missing_text, *cell] for separator, cell in zip(separators, texts, strict=False)]
     cells.append([separators[-1]])
     encoded = [text.encode() for parts in cells for text in parts]
@@ -31,7 +31,7 @@ def table_lines(table: Table, separators: list[str], quoted: Callable[[Any], str
     cell_starts = np.cumsum([0, *map(len, cells[:-1])], dtype=np.int64)
     width = sum(map(len, separators)) + len(table) * max(MAX_WIDTH, *map(len, encoded))
     words, buffer = b"".join(encoded), np.empty(min(count, BLOCK_ROWS) * width + SPARE_CHARACTERS, np.uint8)
-    printed = []
+    blocks = []
     for start in range(0, count, BLOCK_ROWS):
         block = take_rows(table, slice(start, start + BLOCK_ROWS))
         kinds, values = zip(*map(_column_values, block.values()), strict=True)
@@ -39,14 +39,14 @@ def table_lines(table: Table, separators: list[str], quoted: Callable[[Any], str
         value_pointers = (ctypes.c_void_p * len(kinds))(*(column.ctypes.data for column in values))
         pointers = ends.ctypes.data, cell_starts.ctypes.data, buffer.ctypes.data
         size = print_rows(row_count(block), len(kinds), kind_array, value_pointers, words, *pointers)
-        printed.append(buffer[:size].tobytes())
-    return b"".join(printed)
+        blocks.append(buffer[:size].tobytes())
+    return b"".join(blocks)
 
 
-def _column_words(column: Column, quoted: Callable[[Any], str]) -> list[str]:
+def _column_words(column: Column, quote: Callable[[Any], str]) -> list[str]:
     """The words of a column."""
     if isinstance(column, Words):
-        return [quoted(name) for name in column.names]
+        return [quote(name) for name in column.names]
     return ["false", "true"] if column.dtype == bool else []
 
 

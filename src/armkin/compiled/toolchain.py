@@ -180,12 +180,12 @@ def _stored_library(folder: Path, name: str, content: str) -> ctypes.CDLL | None
             # check the digest before loading, as loading an incomplete file ends the process
             if not _is_ours(library) or library.stem != f"{name}-{_digest(library.read_bytes())}":
                 continue
-            loaded = ctypes.CDLL(str(library))
-            stored_content = (ctypes.c_char * (len(content) + 1)).in_dll(loaded, "arm_content").value
+            code = ctypes.CDLL(str(library))
+            stored_content = (ctypes.c_char * (len(content) + 1)).in_dll(code, "arm_content").value
         except (OSError, ValueError):
             continue
         if stored_content == content.encode():
-            return loaded
+            return code
     return None
 
 

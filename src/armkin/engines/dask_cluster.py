@@ -39,17 +39,17 @@ def in_order(address: str, work: Callable[[Any, Chunk], Result], job: Any, chunk
 
 def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> Iterator[Any]:
     """The results in order, with `CHUNKS_AHEAD` chunks for each thread, at least two, on the cluster."""
-    waiting: deque[Any] = deque()
+    futures: deque[Any] = deque()
     name = hashlib.sha256(data).hexdigest()
     while True:
         try:
-            threads = sum(client.nthreads().values()) if not waiting else 0
-            window = max(CHUNKS_AHEAD * threads, 2, len(waiting))
-            while len(waiting) < window and (chunk := next(source, waiting)) is not waiting:
-                waiting.append(client.submit(_run_chunk, data, name, chunk, pure=False))
-            if not waiting:
+            threads = sum(client.nthreads().values()) if not futures else 0
+            window = max(CHUNKS_AHEAD * threads, 2, len(futures))
+            while len(futures) < window and (chunk := next(source, futures)) is not futures:
+                futures.append(client.submit(_run_chunk, data, name, chunk, pure=False))
+            if not futures:
                 return
-            answer = waiting.popleft().result()
+            answer = futures.popleft().result()
         except ArmkinError:
             raise
         except Exception as error:
@@ -57,7 +57,7 @@ def _results(client: Any, address: str, data: bytes, source: Iterator[Any]) -> I
         yield answer
         # send a chunk for each result, so that the window stays full
         with suppress(StopIteration):
-            waiting.append(client.submit(_run_chunk, data, name, next(source), pure=False))
+            futures.append(client.submit(_run_chunk, data, name, next(source), pure=False))
 
 
 def _lost_error(client: Any, address: str, error: Exception) -> ClusterError:
@@ -118,9 +118,9 @@ def _check_workers(client: Any, address: str) -> None:
         raise ClusterError(f"{address}: a worker has no armkin of this version: {error}", address=address) from None
     own_versions = versions()
     for worker, of_worker in of_workers.items():
-        differing = [name for name in own_versions if own_versions[name] != of_worker.get(name)]
-        if differing:
-            differences = ", ".join(f"{name} {of_worker.get(name)} (here {own_versions[name]})" for name in differing)
+        names = [name for name in own_versions if own_versions[name] != of_worker.get(name)]
+        if names:
+            differences = ", ".join(f"{name} {of_worker.get(name)} (here {own_versions[name]})" for name in names)
             raise ClusterError(f"{address}: worker {worker} has {differences}", address=address)
 
 
@@ -152,6 +152,6 @@ class _PackedJob:
 
 
 @lru_cache(maxsize=4)
-def _unpack(packed: _PackedJob) -> tuple[Callable[[Any, Any], Any], Any]:
-    work, job = pickle.loads(packed.data)
+def _unpack(packed_job: _PackedJob) -> tuple[Callable[[Any, Any], Any], Any]:
+    work, job = pickle.loads(packed_job.data)
     return work, job

@@ -28,16 +28,16 @@ _job: tuple[Callable[[Any, Any], Any], Any] | None = None
 def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunks: Iterable[Chunk]) -> Iterator[Result]:
     """See `armkin.engines.ordered_chunks.in_order`."""
     source = iter(chunks)
-    waiting: deque[tuple[Chunk, Future[Result]]] = deque()
+    futures: deque[tuple[Chunk, Future[Result]]] = deque()
     pool, lost_times = _start_pool(workers, work, job), 0
     try:
         while True:
-            while len(waiting) < CHUNKS_AHEAD * workers and (next_chunk := next(source, waiting)) is not waiting:
-                waiting.append((next_chunk, _submit(pool, next_chunk)))  # type: ignore[arg-type]
-            if not waiting:
+            while len(futures) < CHUNKS_AHEAD * workers and (next_chunk := next(source, futures)) is not futures:
+                futures.append((next_chunk, _submit(pool, next_chunk)))  # type: ignore[arg-type]
+            if not futures:
                 return
             try:
-                answer = waiting[0][1].result()
+                answer = futures[0][1].result()
             except BrokenProcessPool:
                 lost_times += 1
                 if lost_times > PATIENCE:
@@ -45,10 +45,10 @@ def in_order(workers: int, work: Callable[[Any, Chunk], Result], job: Any, chunk
                     raise ClusterError(message) from None
                 pool.shutdown(wait=True, cancel_futures=True)
                 pool = _start_pool(workers, work, job)
-                waiting = deque((chunk, _submit(pool, chunk)) for chunk, _ in waiting)
+                futures = deque((chunk, _submit(pool, chunk)) for chunk, _ in futures)
                 continue
             lost_times = 0
-            waiting.popleft()
+            futures.popleft()
             yield answer
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
@@ -72,9 +72,9 @@ def _submit(pool: ProcessPoolExecutor, chunk: Any) -> Future[Any]:
     try:
         return pool.submit(_run_chunk, chunk)
     except BrokenProcessPool as error:
-        failed: Future[Any] = Future()
-        failed.set_exception(error)
-        return failed
+        failed_future: Future[Any] = Future()
+        failed_future.set_exception(error)
+        return failed_future
 
 
 def _begin_worker(work: Callable[[Any, Any], Any], job: Any) -> None:

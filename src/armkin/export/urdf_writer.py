@@ -82,12 +82,12 @@ def _free_name(name: str, used_names: tuple[str, ...]) -> str:
 
 def _joint_lines(arm: Arm, i: int, name: str, parent: str, child: str) -> list[str]:
     """The lines of joint i of a URDF between two links, lengths in metres."""
-    slides, limited = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
-    rotary_kind = "revolute" if limited else "continuous"
+    slides, has_limits = bool(arm.prismatic[i]), math.isfinite(arm.lower[i]) and math.isfinite(arm.upper[i])
+    rotary_kind = "revolute" if has_limits else "continuous"
     kind = "prismatic" if slides else rotary_kind
     unit = METRE if slides else 1.0
     speed = 0.0 if math.isnan(arm.max_speed[i]) else float(arm.max_speed[i]) / unit
-    ends = f'lower="{_real_text(arm.lower[i] / unit)}" upper="{_real_text(arm.upper[i] / unit)}" ' if limited else ""
+    ends = f'lower="{_real_text(arm.lower[i] / unit)}" upper="{_real_text(arm.upper[i] / unit)}" ' if has_limits else ""
     return [
         f'  <joint name="{name}" type="{kind}">',
         *_place_lines(arm.link[i], parent, child),

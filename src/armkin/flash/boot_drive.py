@@ -56,15 +56,16 @@ def copy_image(folder: Path, name: str, data: bytes) -> None:
             f"{folder} is no Pico's boot drive: it has no {_INFO} that says {_CHIP}\n"
             "hold BOOTSEL while you plug the Pico in, or name the serial port of one that runs armkin"
         )
-    written = 0
+    written_count = 0
     try:
         with (folder / name).open("wb", buffering=0) as file:
-            while written < len(data):
-                written += file.write(data[written : written + 65536])
+            while written_count < len(data):
+                written_count += file.write(data[written_count : written_count + 65536])
             with suppress(OSError):  # the drive goes when it has all
                 os.fsync(file.fileno())
     except OSError as error:
-        if written < len(data):
+        if written_count < len(data):
             raise LinkError(
-                f"{folder}: {error.strerror} after {written} of {len(data)} bytes; the same command writes it again"
+                f"{folder}: {error.strerror} after {written_count} of {len(data)} bytes; "
+                "the same command writes it again"
             ) from None

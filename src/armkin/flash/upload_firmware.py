@@ -72,8 +72,8 @@ def upload(image: Image, port: str, tick: Tick = lambda written, total: None) ->
 def _connect_loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort, int]:
     """The boot loader that answers, its open port and the port's rate."""
     expected = _LOADERS[chip]
-    unexpected = [candidate for candidate in _LOADERS.values() if candidate is not expected]
-    for make, baud in [(loader, baud) for loader in (expected, *unexpected) for baud in loader.bauds]:
+    other_loaders = [candidate for candidate in _LOADERS.values() if candidate is not expected]
+    for make, baud in [(loader, baud) for loader in (expected, *other_loaders) for baud in loader.bauds]:
         link = SerialPort(port, baud)
         try:
             if reply := _identify_chip(make, link):
@@ -81,10 +81,10 @@ def _connect_loader(chip: str, kind: str, port: str) -> tuple[Loader, SerialPort
                 if _SIGNATURES.get(signature) == chip:
                     return loader, link, baud
                 name = _SIGNATURES.get(signature, f"of signature {signature.hex(' ')}")
-                fitting = [board.kind for board in BOARDS.values() if board.chip == name]
+                fitting_kinds = [board.kind for board in BOARDS.values() if board.chip == name]
                 raise LinkError(
                     f"the chip on {port} is an {name}; {kind} is for an {chip}: nothing was written\n"
-                    f"boards with such a chip: {', '.join(fitting) or 'armkin has firmware for none with it'}"
+                    f"boards with such a chip: {', '.join(fitting_kinds) or 'armkin has firmware for none with it'}"
                 )
         except BaseException:
             link.close()

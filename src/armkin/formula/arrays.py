@@ -164,8 +164,8 @@ def wrap_angle(angle: E) -> E:
     >>> round(float(wrap_angle(7.0)), 6)
     0.716815
     """
-    wrapped: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
-    return wrapped
+    wrapped_angle: E = angle - 2 * np.pi * _numpy.rint(angle / (2 * np.pi))
+    return wrapped_angle
 
 
 def numbers_within(count: Int) -> Int:

@@ -104,11 +104,11 @@ def write_numpy(recording: Recording, scalar: bool = False) -> tuple[Run, list[B
     """
     terms = {id(node): _signed_term(node) for node in recording.nodes}
     both_signs, buffers = _both_signs(recording, terms), _Buffers(recording)
-    written = [node for node in recording.nodes if id(node) not in both_signs]
-    reads = [_operands(node, both_signs) for node in written]
+    written_nodes = [node for node in recording.nodes if id(node) not in both_signs]
+    reads = [_operands(node, both_signs) for node in written_nodes]
     last = _last_lines([*reads, recording.outputs])
     lines: list[str] = []
-    for k, node in enumerate(written):
+    for k, node in enumerate(written_nodes):
         signed = term if id(term := terms[id(node)]) in both_signs else None
         arguments = [buffers.name(x) for x in node.args] if signed is None else []
         buffers.take_over(node, [x for x in reads[k] if x.op != "input" and last[id(x)] == k])
@@ -150,13 +150,13 @@ def _half_lines(buffers: _Buffers, node: Node, signed: Node) -> Iterator[str]:
     plain = node.args[0] if signed is node.args[1] else node.args[1]
     factors, value = signed.args
     for branch in np.ndindex(factors.shape[:-1]):
-        half = tuple(i if size > 1 else None for i, size in zip(branch, factors.shape, strict=False))
+        places = tuple(i if size > 1 else None for i, size in zip(branch, factors.shape, strict=False))
         factor = factors[branch][0] if node.op == "add" else -factors[branch][0]
         if factor == 0:
-            yield f"positive({buffers.name(plain, half)}, {buffers.name(node, half)})"
+            yield f"positive({buffers.name(plain, places)}, {buffers.name(node, places)})"
         else:
             op = "add" if factor > 0 else "subtract"
-            names = ", ".join(buffers.name(x, half) for x in (plain, value, node))
+            names = ", ".join(buffers.name(x, places) for x in (plain, value, node))
             yield f"{op}({names})"
 
 

@@ -64,11 +64,11 @@ def write_python(recording: Recording) -> Callable[..., tuple[Any, ...]]:
     steps, outputs = _unroll(recording)
     inputs: dict[Value, str] = {(id(node), ()): f"i{k}" for k, node in enumerate(recording.inputs)}
     lines, expressions = _write_lines(steps, _count_uses(steps, outputs), inputs)
-    returned = []
+    output_codes = []
     for x, branches in zip(recording.outputs, outputs, strict=True):
         codes = ", ".join(_expression(value, expressions).code for value in branches)
-        returned.append(f"({codes},)" if axes_of(x) else codes)
-    return function_of(list(inputs.values()), lines, returned, dict(_FUNCTIONS))
+        output_codes.append(f"({codes},)" if axes_of(x) else codes)
+    return function_of(list(inputs.values()), lines, output_codes, dict(_FUNCTIONS))
 
 
 def _write_lines(
@@ -139,9 +139,9 @@ def _unroll(recording: Recording) -> tuple[list[Step], list[list[Value | str]]]:
 def _shorten(op: str, args: list[Value | str], minus: dict[Value | str, Value | str]) -> tuple[str, list[Value | str]]:
     """A simpler equal operation; "same": the result is its argument. minus: arguments of negated values."""
     if op == "multiply":
-        for sign, simpler in (("1.0", "same"), ("-1.0", "negative")):
+        for sign, operation in (("1.0", "same"), ("-1.0", "negative")):
             if sign in args:
-                return simpler, [args[1 - args.index(sign)]]
+                return operation, [args[1 - args.index(sign)]]
     if op == "add":
         for negated, summand in (args, args[::-1]):
             if negated in minus:

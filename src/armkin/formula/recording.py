@@ -241,8 +241,8 @@ def record(formula: Callable[[list[Any]], Sequence[Any]], inputs: int) -> Record
 
 def _live_nodes(nodes: list[Node], outputs: Sequence[Any]) -> list[Node]:
     """The operations that the outputs depend on, in order."""
-    needed = {id(x) for x in outputs if isinstance(x, Node)}
+    needed_ids = {id(x) for x in outputs if isinstance(x, Node)}
     for node in reversed(nodes):
-        if id(node) in needed:
-            needed.update(id(x) for x in node.args if isinstance(x, Node))
-    return [node for node in nodes if id(node) in needed]
+        if id(node) in needed_ids:
+            needed_ids.update(id(x) for x in node.args if isinstance(x, Node))
+    return [node for node in nodes if id(node) in needed_ids]

@@ -52,15 +52,15 @@ class StraightLineCode:
         """Buffers of `run` for batches of a length; every thread has its own, and small ones are kept."""
         from armkin.formula import numpy_code
 
-        _, needed = self._numpy_code()
-        stored: dict[int, list[NDArray[Any]]] = self._thread_buffers.__dict__.setdefault("buffers", {})
-        if length in stored:
-            return stored[length]
-        buffers = numpy_code.workspace(needed, length)
+        _, buffers_needed = self._numpy_code()
+        workspaces: dict[int, list[NDArray[Any]]] = self._thread_buffers.__dict__.setdefault("buffers", {})
+        if length in workspaces:
+            return workspaces[length]
+        buffers = numpy_code.workspace(buffers_needed, length)
         if length <= SMALL_BATCH:
-            if len(stored) >= LENGTHS:
-                stored.clear()
-            stored[length] = buffers
+            if len(workspaces) >= LENGTHS:
+                workspaces.clear()
+            workspaces[length] = buffers
         return buffers
 
     def run(self, inputs: Sequence[Any], workspace: list[NDArray[Any]]) -> tuple[Any, ...]:

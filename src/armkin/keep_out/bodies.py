@@ -63,14 +63,14 @@ def bodies(arm: Arm) -> Bodies:
     (('base', 'q1', 'q2', 'q3'), [12.5, 12.5, 12.5, 12.5], [[0.0, 0.0, -10.0], [197.0, 0.0, -10.0]])
     """
     radii = np.full(arm.n + 1, np.nan) if arm.body_radius is None else arm.body_radius
-    assumed = np.isnan(radii)
+    is_assumed = np.isnan(radii)
     owner, begin, end, slide = zip(
         *_base_segments(arm), *(segment for i in range(arm.n) for segment in _link_segments(arm, i)), strict=True
     )
     return Bodies(
         names=(BASE, *arm.joint_names),
-        radius=np.where(assumed, ASSUMED * arm.reach, radii),
-        assumed=assumed,
+        radius=np.where(is_assumed, ASSUMED * arm.reach, radii),
+        assumed=is_assumed,
         owner=np.array(owner),
         begin=np.array(begin),
         end=np.array(end),

@@ -157,8 +157,8 @@ def guard(arm: Arm) -> Guard:
     if not any(entry.kind == SELF for _, entry in entries):
         return _guard_of_pairs(arm, obstacles, [], ())
     form = bodies(arm)
-    existing = [body for body in range(arm.n + 1) if form.exists(body)]
-    pairs = [(i, j) for i in existing for j in existing if i - j >= 2]
+    body_numbers = [body for body in range(arm.n + 1) if form.exists(body)]
+    pairs = [(i, j) for i in body_numbers for j in body_numbers if i - j >= 2]
     maxima = _guard_of_pairs(arm, (), pairs, ()).distances(sample_postures(arm)).max(axis=0, initial=-np.inf)
     possible_pairs = [pair for pair, greatest in zip(pairs, maxima, strict=True) if greatest >= 0.0]
     left = tuple((form.names[i], form.names[j]) for i, j in pairs if (i, j) not in possible_pairs)

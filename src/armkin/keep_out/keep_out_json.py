@@ -30,8 +30,8 @@ def keep_out_fields(arm: Arm) -> dict[str, Any]:
             ends_in_frame = [(T[:3, :3].T @ (point[:, segment, 0] - T[:3, 3]) + 0.0).tolist() for point in (begin, end)]
             fields: dict[str, Any] = {"from": ends_in_frame[0], "to": ends_in_frame[1]}
             segments.append(fields | {"slide": True} if arm_bodies.slide[segment] else fields)
-        radius, assumed = float(arm_bodies.radius[body]), bool(arm_bodies.assumed[body])
-        bodies.append({"name": name, "radius_mm": radius, "assumed": assumed, "segments": segments})
+        radius, is_assumed = float(arm_bodies.radius[body]), bool(arm_bodies.assumed[body])
+        bodies.append({"name": name, "radius_mm": radius, "assumed": is_assumed, "segments": segments})
     [(_, hits_at_home)] = hits(arm, home)
     return {
         "clearance_mm": arm.clearance,

@@ -97,9 +97,10 @@ def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
         rows = np.flatnonzero(~is_free & (np.diff(samples) > 1))
         if not stride or not len(rows):
             break
-        added = np.concatenate([np.arange(samples[row] + stride, samples[row + 1], stride) for row in rows])
-        rank = np.searchsorted(samples, added)
-        samples, gaps = (np.insert(samples, rank, added), np.insert(gaps, rank, guard.clearances(q[added]), axis=0))
+        new_samples = np.concatenate([np.arange(samples[row] + stride, samples[row + 1], stride) for row in rows])
+        rank = np.searchsorted(samples, new_samples)
+        samples = np.insert(samples, rank, new_samples)
+        gaps = np.insert(gaps, rank, guard.clearances(q[new_samples]), axis=0)
     return hit
 
 
@@ -112,8 +113,8 @@ class _Round:
         greatest = np.maximum.accumulate(clearances, axis=0)
         # least allowed clearance from there on
         allowed = np.where(overlaps_at_start & (greatest < 0.0), greatest - STEP, 0.0)
-        required = np.concatenate([allowed[:1], allowed[:-1]])
-        is_hit = (clearances < required).any(axis=1)
+        required_clearances = np.concatenate([allowed[:1], allowed[:-1]])
+        is_hit = (clearances < required_clearances).any(axis=1)
         self.hit = int(np.argmax(is_hit)) if is_hit.any() else len(places)  # the first place of a hit
         self.open: NDArray[np.bool_] = np.asarray((self.bound < allowed[:-1]).any(axis=1))
         self.open[self.hit :] = False

@@ -46,7 +46,7 @@ def quaternion(R: ArrayLike) -> Array:
     x, y, z = R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]
     xy, yz, zx = R[..., 0, 1] + R[..., 1, 0], R[..., 1, 2] + R[..., 2, 1], R[..., 2, 0] + R[..., 0, 2]
     # 4 q q^T: each row is the quaternion times one of its own components
-    outer = np.stack(
+    outer_products = np.stack(
         [
             np.stack([1 + xx + yy + zz, x, y, z], axis=-1),
             np.stack([x, 1 + xx - yy - zz, xy, zx], axis=-1),
@@ -55,8 +55,8 @@ def quaternion(R: ArrayLike) -> Array:
         ],
         axis=-2,
     )
-    largest = np.argmax(np.einsum("...ii->...i", outer), axis=-1)
-    row = np.take_along_axis(outer, largest[..., None, None], axis=-2)[..., 0, :]
+    largest = np.argmax(np.einsum("...ii->...i", outer_products), axis=-1)
+    row = np.take_along_axis(outer_products, largest[..., None, None], axis=-2)[..., 0, :]
     row = row * np.where(row[..., :1] < 0, -1.0, 1.0)
     return np.asarray(row / np.linalg.norm(row, axis=-1, keepdims=True) + 0.0)
 

@@ -40,8 +40,8 @@ def parse_csv(raw: bytes, name: str) -> PathFile:
         raise PathFileError(f"{name}: has a header and no rows", file=name)
     moves = [_row_to_move(header, row, first=not k, line=(name, number)) for k, (number, row) in enumerate(rows)]
     places: dict[tuple[str | int, ...], int] = {("moves", k): number for k, (number, _) in enumerate(rows)}
-    smooth = moves[0].point is not None and "blend" not in (header or ())
-    return PathFile.model_construct(moves=moves, corners="tolerance" if smooth else None).read_from(
+    is_smooth = moves[0].point is not None and "blend" not in (header or ())
+    return PathFile.model_construct(moves=moves, corners="tolerance" if is_smooth else None).read_from(
         Source(name, places, rows=True)
     )
 
@@ -60,10 +60,10 @@ def _check_header(cells: list[str], name: str) -> list[str]:
     header = [_cell_text(cell) for cell in cells]
     if doubled := sorted({key for key in header if header.count(key) > 1}):
         raise PathFileError(f"{name}:1: column {doubled[0]} stands twice in the header", file=name)
-    strange = [key for key in header if key not in _TARGETS + _OPTIONS]
-    if strange and len(strange) < len(header) - sum(key in _OPTIONS for key in header):
+    unknown_keys = [key for key in header if key not in _TARGETS + _OPTIONS]
+    if unknown_keys and len(unknown_keys) < len(header) - sum(key in _OPTIONS for key in header):
         raise PathFileError(
-            f"{name}:1: column {strange[0] or 'without a name'} is unknown beside those of a target: "
+            f"{name}:1: column {unknown_keys[0] or 'without a name'} is unknown beside those of a target: "
             f"{', '.join(_TARGETS + _OPTIONS)}", file=name, line=1,
         )  # fmt: skip
     return header
@@ -72,13 +72,13 @@ def _check_header(cells: list[str], name: str) -> list[str]:
 def _filled_rows(text: str, name: str) -> list[Row]:
     """Rows that are neither empty nor a comment, with their numbers: at most a header, and one too many."""
     lines = csv.reader(io.StringIO(text))
-    filled = (
+    rows = (
         (number, row)
         for number, row in enumerate(lines, 1)
         if any(cell.strip() for cell in row) and not row[0].lstrip().startswith("#")
     )
     try:
-        return list(islice(filled, MAX_POINTS + 2))
+        return list(islice(rows, MAX_POINTS + 2))
     except csv.Error as error:
         line = lines.line_num
         raise PathFileError(f"{name}:{line}: no row of numbers: {error}", file=name, line=line) from None

@@ -31,10 +31,10 @@ class Placing:
     def points(self, points: Iterable[Sequence[float]]) -> list[list[float]]:
         """Points of the drawing in the arm's frame."""
         k, (ox, oy, oz), ((ax, ay, az), (bx, by_, bz), (cx, cy, cz)) = self.scale, self.origin, self.axes
-        scaled = ((x * k, y * k, z * k) for x, y, z in points)
+        scaled_points = ((x * k, y * k, z * k) for x, y, z in points)
         return [
             [ox + ax * x + ay * y + az * z, oy + bx * x + by_ * y + bz * z, oz + cx * x + cy * y + cz * z]
-            for x, y, z in scaled
+            for x, y, z in scaled_points
         ]
 
     def direction(self, direction: Sequence[float]) -> list[float]:
@@ -75,10 +75,10 @@ class Pen:
     def line(self, point: Sequence[float], speed: float | None, line: int) -> None:
         """A straight line; speed: [mm/s], None: as fast as the joints go."""
         if self._open is None or speed != self._speed:
-            opened: list[Sequence[float]] = []
-            self._add(Move.model_construct({"polyline"}, polyline=opened, **_speed_key(speed)), line)
-            self._open, self._speed = opened, speed
-            self._drawn.append(opened)
+            polyline: list[Sequence[float]] = []
+            self._add(Move.model_construct({"polyline"}, polyline=polyline, **_speed_key(speed)), line)
+            self._open, self._speed = polyline, speed
+            self._drawn.append(polyline)
         self._open.append(point)
         self.points += 1
 

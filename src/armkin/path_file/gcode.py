@@ -107,14 +107,14 @@ class _Program:
         """One line, in RS-274's order of execution; True: the program ends."""
         codes, m_codes, values = self._sort_words()
         self._take_feed(codes, values)
-        gripped = values.pop("S", None)
+        s_value = values.pop("S", None)
         for switch in (code for code in m_codes if code not in _PAUSES + _ENDS):
-            self._switch(switch, gripped)
+            self._switch(switch, s_value)
         waits = 4.0 in codes and "P" not in values
-        if gripped is not None and not waits and not (self.options.grip_by == "M106" and 106.0 in m_codes):
+        if s_value is not None and not waits and not (self.options.grip_by == "M106" and 106.0 in m_codes):
             self._ignore("S")
         if 4.0 in codes:
-            self._dwell(values, gripped)
+            self._dwell(values, s_value)
         self._set_modes(codes)
         self._pass_over(codes, values)
         self._offsets_and_motion(codes, values)

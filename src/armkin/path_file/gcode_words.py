@@ -62,12 +62,12 @@ def _strip_checksum(line: str, raw: str, name: str, number: int) -> str:
     return body
 
 
-def _why_no_words(line: str, packed: str) -> str:
+def _why_no_words(line: str, dense_line: str) -> str:
     """What is wrong with a line that is more than words; packed: the line without its blanks."""
     index = 0
-    while (word := _WORD.match(packed, index)) is not None:
+    while (word := _WORD.match(dense_line, index)) is not None:
         index = word.end()
-    unread = packed[index:]
+    unread = dense_line[index:]
     if unread[0] in "#=[]" or unread[1:2] in ("#", "["):
         return f"'{unread[:20]}': expressions, parameters and macros are not known"
     near = next((part for part in line.split() if not _is_words(part)), unread)
@@ -87,13 +87,13 @@ def words_of(line: str, name: str, number: int) -> Words:
         raise line_error(name, number, f"has {len(line)} characters; a line of G-code has at most {_MAX_LINE}")
     if "28" in line and _HOME.match(line) is not None:
         line = _FLAG.sub(" ", line)
-    packed = "".join(line.split())
-    if packed.startswith("/"):
+    dense_line = "".join(line.split())
+    if dense_line.startswith("/"):
         raise line_error(name, number, "'/' marks a line that a machine's switch leaves out: write it or leave it out")
-    pairs = _WORD.findall(packed)
+    pairs = _WORD.findall(dense_line)
     words = [letter + number for letter, number in pairs]
-    if "".join(words) != packed:
-        raise line_error(name, number, _why_no_words(line, packed))
+    if "".join(words) != dense_line:
+        raise line_error(name, number, _why_no_words(line, dense_line))
     return tuple(
         (letter, float(number), word) for (letter, number), word in zip(pairs, words, strict=True) if letter != "N"
     )

@@ -87,8 +87,8 @@ def _parse_tree(raw: bytes, name: str) -> _Element:
 class _Reader:
     """Puts elements together as expat reads them; skipped: lines before the text that it reads."""
 
-    def __init__(self, name: str, skipped: int) -> None:
-        self.name, self.skipped = name, skipped
+    def __init__(self, name: str, skipped_lines: int) -> None:
+        self.name, self.skipped = name, skipped_lines
         self.top = _Element("", {}, 0)
         self._open = [self.top]
         self.parser = expat.ParserCreate()

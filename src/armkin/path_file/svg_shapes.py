@@ -322,8 +322,8 @@ def _draw_curve(
     curve, start = "C" if kind in "CS" else "Q", pen.position
     first, end = (values[0], values[1]), (values[-2], values[-1])
     if kind in "ST":
-        mirrored = last_control[1] if last_control is not None and last_control[0] == curve else start
-        first = (2 * start[0] - mirrored[0], 2 * start[1] - mirrored[1])
+        last_second = last_control[1] if last_control is not None and last_control[0] == curve else start
+        first = (2 * start[0] - last_second[0], 2 * start[1] - last_second[1])
     if curve == "C":
         second = (values[-4], values[-3])
         pen.bezier(first, second, end)

@@ -203,8 +203,8 @@ def _draw_from_near(plan: PathPlan, figure: Any, tool_path: Array) -> None:
     i, j = sorted(np.argsort(size)[1:].tolist())
     axes = flat_axes(figure, (0.06, 0.055, 0.46, 0.27), (f"{'xyz'[i]} / mm", f"{'xyz'[j]} / mm"), shrink=True)
     length = np.nansum(np.linalg.norm(np.diff(tool_path, axis=0), axis=1))
-    thin = float(np.clip(_INKED * size[i] * size[j] / max(length, 1e-9) / size.max(), *_WIDTHS))
-    axes.plot(tool_path[:, i], tool_path[:, j], color=_INK, linewidth=thin, label="the tool's way")
+    line_width = float(np.clip(_INKED * size[i] * size[j] / max(length, 1e-9) / size.max(), *_WIDTHS))
+    axes.plot(tool_path[:, i], tool_path[:, j], color=_INK, linewidth=line_width, label="the tool's way")
     if plan.rounded_most is not None:
         rounded_tip = position(plan.arm, plan.q(_time_of(plan, plan.rounded_most)))
         axes.plot(rounded_tip[i], rounded_tip[j], color=_SINGULAR_COLOUR, marker="+", markersize=9, linestyle="none",
@@ -216,8 +216,8 @@ def _draw_from_near(plan: PathPlan, figure: Any, tool_path: Array) -> None:
 def _other_starts(plan: PathPlan) -> list[Array]:
     """Joint values at the path's start of the branches that would carry it as well."""
     first_names = {run.names[0][1] for run in plan.runs[:1]}
-    carrying = [branch for branch in plan.branches if branch.carries >= plan.length - 0.01]
-    return [branch.start_joints for branch in carrying if branch.name not in first_names]
+    carrying_branches = [branch for branch in plan.branches if branch.carries >= plan.length - 0.01]
+    return [branch.start_joints for branch in carrying_branches if branch.name not in first_names]
 
 
 def _draw_joints(plan: PathPlan, axes: Any, t: Array, q: Array) -> None:

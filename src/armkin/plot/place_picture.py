@@ -51,9 +51,9 @@ def _draw_arm(axes: Any, place: Place) -> None:
     middle = count // 2
     for k in dict.fromkeys((0, count - 1, middle)) if count else ():
         line = skeleton(stands, place.postures[k]).path
-        pale = 1.0 if k == middle else 0.45
-        axes.plot(*line[:, :2].T, color="white", lw=5.0, alpha=pale, solid_capstyle="round", solid_joinstyle="round")
-        axes.plot(*line[:, :2].T, color=INK, lw=2.4, alpha=pale, solid_capstyle="round", solid_joinstyle="round")
+        opacity = 1.0 if k == middle else 0.45
+        axes.plot(*line[:, :2].T, color="white", lw=5.0, alpha=opacity, solid_capstyle="round", solid_joinstyle="round")
+        axes.plot(*line[:, :2].T, color=INK, lw=2.4, alpha=opacity, solid_capstyle="round", solid_joinstyle="round")
 
 
 def _heading_stroke(x: float, y: float, yaw: float, size: float) -> tuple[list[float], list[float]]:

@@ -56,9 +56,9 @@ def plot_poses(
     is_single = len(poses) == 1
     drawn_poses = poses if names is not None else poses[_spread_indices(len(poses))]
     bones = [skeleton(arm, pose) for pose in drawn_poses]
-    legal: list[bool] = np.logical_not(outside_limits(arm, drawn_poses).any(axis=1)).tolist()
+    is_legal: list[bool] = np.logical_not(outside_limits(arm, drawn_poses).any(axis=1)).tolist()
     hit = _hit_texts(arm, drawn_poses)
-    legend = ["start", "end"] if names is None else _legend_texts(names, legal, hit)
+    legend = ["start", "end"] if names is None else _legend_texts(names, is_legal, hit)
     with picture(out, 8.0 if is_single else 9.6, 5.8) as figure:
         track = None if is_single or names is not None else fk(arm, _joint_way(poses))[:, :3, 3]
         drawing = _Drawing(arm, figure, bones, view, track)
@@ -67,9 +67,9 @@ def plot_poses(
         if is_single:
             drawing.draw_single(bones[0], _HIT if hit[0] else PALETTE[0])
             drawing.name_joints(bones[0])
-            notes = _notes_of_one(bones[0], legal[0], hit[0])
+            notes = _notes_of_one(bones[0], is_legal[0], hit[0])
         else:
-            _draw_several(drawing, bones, legend, legal, hit, in_turn=names is None)
+            _draw_several(drawing, bones, legend, is_legal, hit, in_turn=names is None)
         if track is not None:
             drawing.draw_track(track)
         if is_single if frames is None else frames:
@@ -83,7 +83,7 @@ def _draw_several(
     drawing: _Drawing,
     bones: list[Skeleton],
     legend: Sequence[str],
-    legal: Sequence[bool],
+    is_legal: Sequence[bool],
     hit: Sequence[str],
     *,
     in_turn: bool,
@@ -93,20 +93,20 @@ def _draw_several(
     if in_turn:
         for k, bone in enumerate(bones):
             label = {last: legend[1], 0: legend[0]}.get(k)
-            drawing.draw_arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not legal[k])
+            drawing.draw_arm(bone, _HIT if hit[k] else _path_colour(k / last), label, 2.6, dashed=not is_legal[k])
         return
     # Branches may lie on each other: the first one, which is the best, comes last and is the thinnest.
     widths = 2.4 + np.minimum(0.5, 3.0 / len(bones)) * np.arange(len(bones)) + _extra_widths(bones)
     for k in sorted(range(len(bones)), key=lambda k: -widths[k]):
         drawing.draw_arm(
-            bones[k], _HIT if hit[k] else _branch_colour(k, len(bones)), legend[k], widths[k], dashed=not legal[k]
+            bones[k], _HIT if hit[k] else _branch_colour(k, len(bones)), legend[k], widths[k], dashed=not is_legal[k]
         )
 
 
-def _notes_of_one(bone: Skeleton, legal: bool, hit: str) -> list[str]:
+def _notes_of_one(bone: Skeleton, is_legal: bool, hit: str) -> list[str]:
     """What is noted of a single pose."""
     tip = "tip ({:.1f}, {:.1f}, {:.1f}) mm".format(*np.round(bone.tip, 1) + 0.0)
-    return [tip, *(["outside the joint limits"] if not legal else []), *([hit] if hit else [])]
+    return [tip, *(["outside the joint limits"] if not is_legal else []), *([hit] if hit else [])]
 
 
 def _check_poses(arm: Arm, q: ArrayLike, names: Sequence[str] | None) -> Array:

@@ -23,8 +23,8 @@ def plot_reach(reach: Reach, out: str) -> None:
         raise UsageError("this map is in a file alone: too many cells for a picture")
     grid = reach.grid
     share = reach.columns["share"]
-    fullest = _fullest_level(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
-    side, slab = voxels.section_layer(grid), voxels.level_layer(grid, fullest)
+    fullest_level = _fullest_level(grid.rings[:, 1], share.reshape(-1, grid.azimuths).sum(axis=1))
+    side, slab = voxels.section_layer(grid), voxels.level_layer(grid, fullest_level)
     with picture(out, 11.4, 6.6) as figure:
         for column, (name, label) in enumerate(_SHOWN):
             values = np.where(share > 0, reach.columns[name], np.nan)
@@ -44,7 +44,7 @@ def plot_reach(reach: Reach, out: str) -> None:
         figure.text(
             0.03,
             0.945,
-            f"{cells_text};  above: y = 0;  below: z = {fullest * grid.step:g} mm",
+            f"{cells_text};  above: y = 0;  below: z = {fullest_level * grid.step:g} mm",
             fontsize=9,
             va="top",
             color=SOFT,

@@ -123,10 +123,10 @@ class _Answers:
         solutions = ik(self.arm, target)
         self.s, self.valid = solutions, solutions.valid
         self.count = self.grid.rolls_count if question.roll_arcs else 1
-        legal = solutions.within_limits & solutions.clear if self.arm.keep_out else solutions.within_limits
+        is_legal = solutions.within_limits & solutions.clear if self.arm.keep_out else solutions.within_limits
         self.rolls: Words = np.full((*solutions.valid.shape, 1), np.uint64(1))
         self.first: NDArray[Any] = np.zeros(solutions.valid.shape, np.intp)  # (S, B) of azimuths
-        self.length: NDArray[Any] = legal.astype(np.intp)
+        self.length: NDArray[Any] = is_legal.astype(np.intp)
         if question.by_arcs:
             last = self.arm.n - 1 if question.roll_arcs else self.arm.n
             is_inside = solutions.valid & cells_inside(self.arm, solutions.q, range(1, last))
@@ -172,13 +172,13 @@ class _Answers:
         S, P = self.places.shape
         at_least_once: Words = np.zeros((S, P, self.rolls.shape[-1]), np.uint64)
         at_least_twice: Words = np.zeros_like(at_least_once)
-        legal = np.zeros((S, P))
+        legal_count = np.zeros((S, P))
         roll_counts = _count_bits(self.rolls)
         for branch in range(self.first.shape[1]):
             steps_on_arc = self.places - self.first[:, branch, None]
             steps_on_arc += (steps_on_arc < 0) * self.question.turns
             on_arc = steps_on_arc < self.length[:, branch, None]
-            legal += on_arc * roll_counts[:, branch, None]
+            legal_count += on_arc * roll_counts[:, branch, None]
             rolls_there = -on_arc.astype(np.int64).view(np.uint64)[:, :, None] & self.rolls[:, branch, None, :]
             at_least_twice |= at_least_once & rolls_there
             at_least_once |= rolls_there
@@ -186,7 +186,7 @@ class _Answers:
         counts = {
             "reached": weight * _count_bits(at_least_once),
             "single": weight * _count_bits(at_least_once & ~at_least_twice),
-            "legal": weight * legal,
+            "legal": weight * legal_count,
         }
         return counts | {"anywhere": anywhere_count}
 
@@ -213,8 +213,10 @@ class _Answers:
         counts = {name: np.zeros((len(rows), M)) for name in ("reached", "single", "legal", "anywhere")}
         for number, row in enumerate(rows.tolist()):
             solutions = self._all_solutions(row)
-            legal = solutions.within_limits.sum(axis=1)
-            for name, flags in zip(counts, (legal > 0, legal == 1, legal, solutions.valid.any(axis=1)), strict=True):
+            legal_count = solutions.within_limits.sum(axis=1)
+            for name, flags in zip(
+                counts, (legal_count > 0, legal_count == 1, legal_count, solutions.valid.any(axis=1)), strict=True
+            ):
                 counts[name][number] = flags.reshape(M, self.count).sum(axis=1)
         return _Edges(rows, counts)
 
@@ -234,18 +236,18 @@ class _Answers:
         """Best manipulability and limit margin, and least step error, over the legal answers; nan without any."""
         steps_on_arc = (np.arange(self.question.turns) - self.first[:, :, None]) % self.question.turns
         rolls = np.asarray(np.any(self.rolls != 0, axis=2, keepdims=True))
-        legal = (steps_on_arc < self.length[:, :, None]) & rolls  # (S, B, M or 1)
-        is_legal: Bool = np.asarray(legal.any(axis=2))
+        legal_rolls = (steps_on_arc < self.length[:, :, None]) & rolls  # (S, B, M or 1)
+        is_legal: Bool = np.asarray(legal_rolls.any(axis=2))
         q = self.s.q[is_legal]
         measures = {
             "manipulability": _manipulability(self.arm, q)[:, None],
-            "limit_margin": self._margins(q, legal.shape[2]),
+            "limit_margin": self._margins(q, legal_rolls.shape[2]),
             "step_error_mm": -_step_error(self.arm, q)[:, None],
         }
         for name, values in measures.items():
-            legal_values = np.full(legal.shape, -np.inf)
+            legal_values = np.full(legal_rolls.shape, -np.inf)
             legal_values[is_legal] = np.where(np.isnan(values), -np.inf, values)
-            best_values = np.where(legal, legal_values, -np.inf).max(axis=1, initial=-np.inf)
+            best_values = np.where(legal_rolls, legal_values, -np.inf).max(axis=1, initial=-np.inf)
             best_values = best_values.reshape(-1, orientations, best_values.shape[1]).max(axis=1)
             best_values = np.where(
                 np.isfinite(best_values), np.abs(best_values) if name == "step_error_mm" else best_values, np.nan
@@ -332,8 +334,8 @@ def pack_bits(bits: Bool) -> Words:
     length = bits.shape[-1]
     padded = np.zeros((*bits.shape[:-1], -(-length // 64) * 64), bool)
     padded[..., :length] = bits
-    packed = np.packbits(padded, axis=-1, bitorder="little")
-    return packed.view("<u8").astype(np.uint64)
+    bytes_of_bits = np.packbits(padded, axis=-1, bitorder="little")
+    return bytes_of_bits.view("<u8").astype(np.uint64)
 
 
 def _count_bits(words: Words) -> NDArray[np.int64]:

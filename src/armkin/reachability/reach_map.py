@@ -138,7 +138,7 @@ def reach(
     >>> found.method, found.cells, found.reached
     ('arcs', 744, 200)
     """
-    started = time.perf_counter()
+    start_time = time.perf_counter()
     cells = Grid(
         arm=arm,
         step=float(grid),
@@ -162,7 +162,7 @@ def reach(
         solves=run.solves,
         reached=run.reached,
         volume_mm3=run.volume,
-        seconds=time.perf_counter() - started,
+        seconds=time.perf_counter() - start_time,
     )
 
 

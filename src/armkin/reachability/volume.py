@@ -222,19 +222,21 @@ class _Cells:
         first = np.full(len(low), np.inf)
         gaps = np.zeros(len(low))
         for stretch in range(self.stretches):
-            occupied = np.isfinite(low[:, stretch])
-            gap = np.where(occupied, low[:, stretch], 0.0) - np.where(np.isfinite(last_end), last_end, np.inf) - sweep
-            gaps += np.where(occupied, np.maximum(gap, 0.0), 0.0)
+            is_occupied = np.isfinite(low[:, stretch])
+            gap = (
+                np.where(is_occupied, low[:, stretch], 0.0) - np.where(np.isfinite(last_end), last_end, np.inf) - sweep
+            )
+            gaps += np.where(is_occupied, np.maximum(gap, 0.0), 0.0)
             first = np.where(np.isfinite(first), first, low[:, stretch])
-            last_end = np.where(occupied, high[:, stretch], last_end)
-        occupied = np.isfinite(first)
-        first, last_end = np.where(occupied, first, 0.0), np.where(occupied, last_end, 0.0)
+            last_end = np.where(is_occupied, high[:, stretch], last_end)
+        is_occupied = np.isfinite(first)
+        first, last_end = np.where(is_occupied, first, 0.0), np.where(is_occupied, last_end, 0.0)
         # the circle without its gaps, of which one lies between the last and the first interval
         if self.section.revolute:
             total = 2 * math.pi - gaps - np.maximum(first + 2 * math.pi - last_end - sweep, 0.0)
         else:
             total = last_end - first + sweep - gaps
-        return np.where(occupied, total, 0.0).reshape(self.shape)
+        return np.where(is_occupied, total, 0.0).reshape(self.shape)
 
     def bracket(self) -> tuple[float, float]:
         """Lower and upper bound of the volume or area."""

@@ -105,7 +105,7 @@ def workspace(
         MissingExtraError: a cluster without Dask.
         ClusterError: the cluster cannot be reached, or a worker fails.
     """
-    started = time.perf_counter()
+    start_time = time.perf_counter()
     sampling = _sampling(arm, samples, grid_points, seed)
     for name in measures:
         if name not in MEASURES:
@@ -122,7 +122,7 @@ def workspace(
                 progress(tally.samples)
         # inside the block, so that an error in the volume leaves no file
         size = extent(actual_arm(arm), seed, sampling.count) if volume else None
-    return tally.result(measures, size, time.perf_counter() - started)
+    return tally.result(measures, size, time.perf_counter() - start_time)
 
 
 class Job(NamedTuple):

@@ -117,9 +117,9 @@ def keep_out_problems(
     """
     body_names, earlier_entries = set(bodies), list(earlier)
     entries = list(entries)
-    called = keep_out_names([*earlier_entries, *entries])
-    known_names = set(called[: len(earlier_entries)]) - {SELF}
-    for i, (entry, name) in enumerate(zip(entries, called[len(earlier_entries) :], strict=True)):
+    names = keep_out_names([*earlier_entries, *entries])
+    known_names = set(names[: len(earlier_entries)]) - {SELF}
+    for i, (entry, name) in enumerate(zip(entries, names[len(earlier_entries) :], strict=True)):
         for path, text in _check_shape(entry):
             yield ("keep_out", i, *path), text
         if entry.kind == SELF:

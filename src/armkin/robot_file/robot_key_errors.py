@@ -119,7 +119,7 @@ _SYNONYMS: dict[str, str] = {
 
 def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
     """pydantic's error list (``ValidationError.errors()``) as paths and texts."""
-    suggested = _suggested_keys(errors)
+    suggested_keys = _suggested_keys(errors)
     wrong_lengths: set[Path] = set()
     for error in errors:
         path: Path = tuple(part for part in error["loc"] if part != "[key]")
@@ -133,7 +133,7 @@ def problems(errors: list[Any]) -> Iterator[tuple[Path, str]]:
             if path[:-1] not in wrong_lengths:  # [1] for a triple misses two numbers: one message
                 wrong_lengths.add(path[:-1])
                 yield path[:-1], f"is too short; write {_example(path[:-1])}"
-        elif error["type"] != "missing" or path not in suggested:
+        elif error["type"] != "missing" or path not in suggested_keys:
             yield path, _error_text(error)
 
 

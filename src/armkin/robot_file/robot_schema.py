@@ -120,9 +120,9 @@ def _tidy_schema(part: Any) -> Any:
     if not isinstance(part, dict):
         return part
     titles = {name for name, content in part.items() if name == "title" and isinstance(content, str)}
-    tidy = {name: _tidy_schema(content) for name, content in part.items() if name not in titles}
-    match tidy.get("allOf"):
+    tidy_part = {name: _tidy_schema(content) for name, content in part.items() if name not in titles}
+    match tidy_part.get("allOf"):
         case [{"$ref": str(reference)}]:
-            del tidy["allOf"]
-            return {"$ref": reference, **tidy}
-    return tidy
+            del tidy_part["allOf"]
+            return {"$ref": reference, **tidy_part}
+    return tidy_part

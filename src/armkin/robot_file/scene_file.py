@@ -75,10 +75,10 @@ def _place_text(path: strict_yaml.Path) -> str:
     """The place in words: ``keep_out 2: box.min: ``."""
     if not path:
         return ""
-    key, inside = path[0], path[1:]
-    if inside and isinstance(inside[0], int):
-        key, inside = f"{key} {inside[0] + 1}", inside[1:]
-    inner = ".".join(strict_yaml.one_line(str(part)) for part in inside if not isinstance(part, int))
+    key, inner_path = path[0], path[1:]
+    if inner_path and isinstance(inner_path[0], int):
+        key, inner_path = f"{key} {inner_path[0] + 1}", inner_path[1:]
+    inner = ".".join(strict_yaml.one_line(str(part)) for part in inner_path if not isinstance(part, int))
     return f"{strict_yaml.one_line(str(key))}: " + (f"{inner}: " if inner else "")
 
 

@@ -140,9 +140,9 @@ def _parse(text: str, kind: Kind) -> Iterator[Any]:
             raise StrictYamlError(0, f"not YAML: {error.problem}") from None
         source = text.splitlines() or [""]
         line = min(mark.line + 1, len(source))  # an end that came too early is on the last line
-        faulty = source[line - 1]
-        character = faulty[mark.column : mark.column + 1]
-        if character == "\t" or "\t" in faulty[: len(faulty) - len(faulty.lstrip())]:
+        faulty_line = source[line - 1]
+        character = faulty_line[mark.column : mark.column + 1]
+        if character == "\t" or "\t" in faulty_line[: len(faulty_line) - len(faulty_line.lstrip())]:
             raise StrictYamlError(line, "a tab is not allowed in YAML's indentation; use spaces") from None
         if character and character in "%@`":
             raise StrictYamlError(line, f"text cannot begin with {character}; put it in quotes") from None

@@ -112,12 +112,12 @@ def _branches_json(arm: Arm, question: Question, quick: QuickIk | None) -> dict[
     shown = units.joints_out(arm, question.q).tolist()
     held = {name: shown[arm.joint_names.index(name)] for name in question.held}
     request = choose_branch.Request(arm=arm, near=shown, held=held, ik=quick.ik if quick else ik)
-    prepared = choose_branch.prepared_arm(request)
-    task, reason = _solvable_task(prepared)
+    prepared_arm = choose_branch.prepared_arm(request)
+    task, reason = _solvable_task(prepared_arm)
     if task is None:
         return {"task": None, "why": reason, "branches": [], "status": None}
     if quick:
-        quick.build(prepared, task.name)
+        quick.build(prepared_arm, task.name)
     free_joints = [i for i, name in enumerate(arm.joint_names) if name not in held]
     values, goal = _target_of(arm, task, question, free_joints)
     request = replace(request, task=task.name)

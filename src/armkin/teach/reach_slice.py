@@ -76,10 +76,10 @@ def _reached_shares(grid: Grid, redundant: Redundancy, values: Array) -> Array:
     is_reached = np.zeros(len(target), bool)
     near_enough = distance(arm, redundant.task, target) <= 1.0
     for value in values:
-        unreached = np.flatnonzero(near_enough & ~is_reached)
+        unreached_rows = np.flatnonzero(near_enough & ~is_reached)
         solutions = ik(
             redundant.rest,
-            move_targets(arm, redundant, target[unreached], np.full(len(unreached), value)),
+            move_targets(arm, redundant, target[unreached_rows], np.full(len(unreached_rows), value)),
             redundant.task.name,
             examine=False,
         )
@@ -88,5 +88,5 @@ def _reached_shares(grid: Grid, redundant: Redundancy, values: Array) -> Array:
             is_legal = is_legal & hits_nothing(
                 arm, np.insert(np.where(is_legal[:, :, None], solutions.q, np.nan), joint, value, axis=2)
             )
-        is_reached[unreached] = is_legal.any(axis=1)
+        is_reached[unreached_rows] = is_legal.any(axis=1)
     return np.asarray(is_reached.reshape(-1, count).mean(axis=1))

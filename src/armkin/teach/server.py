@@ -78,11 +78,11 @@ def _shut_down(connection: socket.socket) -> None:
 @cache
 def served_files() -> dict[str, tuple[str, bytes]]:
     """{path: (kind, content)} of every file that is served."""
-    served = {}
+    file_of_path = {}
     for path in sorted(STATIC.rglob("*")):
         if path.suffix in _KINDS:
-            served["/" + path.relative_to(STATIC).as_posix()] = (_KINDS[path.suffix], path.read_bytes())
-    return served
+            file_of_path["/" + path.relative_to(STATIC).as_posix()] = (_KINDS[path.suffix], path.read_bytes())
+    return file_of_path
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -172,8 +172,8 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.actions.tabs.close_tab(tab)
 
     def _is_gone(self) -> bool:
-        ready, _, _ = select.select([self.connection], [], [], 0)
-        return bool(ready) and not self.connection.recv(1, socket.MSG_PEEK)
+        readable, _, _ = select.select([self.connection], [], [], 0)
+        return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
 
     def _send_json(self, status: int, value: Any) -> None:
         self._send_content(status, "application/json", json.dumps(value, allow_nan=False).encode(), "")

@@ -73,7 +73,7 @@ def _module_of_all(arm: Arm, task_name: str | None, has_motors: bool) -> str:
         *_data_lines(arm, actual, task, geometry, branches, has_motors),
         *_kinematics(actual, task),
         *_keep_outs(arm, actual),
-        _by_joint(actual, calibrated=bool((arm.ratio != 1.0).any())),
+        _by_joint(actual, has_ratio=bool((arm.ratio != 1.0).any())),
         *map(part_text, _SOLVER),
         *(map(part_text, js_elimination.METHOD) if geometry.pairs is None else ()),
         solve,
@@ -227,7 +227,7 @@ def _data_lines(arm: Arm, actual: Arm, task: Task, geometry: Geometry, branches:
     return [*code, ""]
 
 
-def _by_joint(arm: Arm, *, calibrated: bool) -> str:
+def _by_joint(arm: Arm, *, has_ratio: bool) -> str:
     """The joint values of a candidate and their legal copies, without loops, which would take twice as long."""
     n = arm.n
     values = ", ".join(f"allJoints[{n} * b + {j}]" for j in range(n))
@@ -235,7 +235,7 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
     text = _function_text(head, [f"return [{values}];"])
     lines = ["let inside = true;", "let turned = 0;", "let slid = 0;", "let value = 0;"]
     for j in range(n):
-        lines += _copy_of_joint(arm, j, calibrated=calibrated)
+        lines += _copy_of_joint(arm, j, has_ratio=has_ratio)
     lines += [
         "copyInside = inside;",
         "copyMotion[0] = turned * DEGREES + slid;",
@@ -250,13 +250,13 @@ def _by_joint(arm: Arm, *, calibrated: bool) -> str:
     return text + "\n" + _function_text(head, lines)
 
 
-def _copy_of_joint(arm: Arm, j: int, *, calibrated: bool) -> list[str]:
+def _copy_of_joint(arm: Arm, j: int, *, has_ratio: bool) -> list[str]:
     """The lines that move joint j to its nearest legal copy, and add up its motion."""
     low, high, slides = float(arm.lower[j]), float(arm.upper[j]), bool(arm.prismatic[j])
     tests = [f"value >= {low!r} - SLACK"] if np.isfinite(low) else []
     tests += [f"value <= {high!r} + SLACK"] if np.isfinite(high) else []
     check = [f"if (!({' && '.join(tests)})) inside = false;"] if tests else []
-    change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if calibrated else ''}"
+    change = f"Math.abs(value - near[{j}]){f' / ARM.ratio[{j}]' if has_ratio else ''}"
     if slides:
         return [f"value = q[{j}];", *check, f"slid += {change};"]
     copy = f"  q[{j}] = value = nearestCopy(value, near[{j}], {_js_text(low)}, {_js_text(high)}, {_js_text(slides)});"
@@ -291,9 +291,9 @@ def _keep_outs(arm: Arm, actual: Arm) -> list[str]:
 
 def _js_text(value: Any) -> str:
     """A value as JavaScript (JSON and infinity), escaped so that it ends neither a script element nor a line."""
-    escaped = {"<": "\\u003c", "\u2028": "\\u2028", "\u2029": "\\u2029"}
+    escape_of = {"<": "\\u003c", "\u2028": "\\u2028", "\u2029": "\\u2029"}
     text = json.dumps(value, ensure_ascii=False)
-    for letter, code in escaped.items():
+    for letter, code in escape_of.items():
         text = text.replace(letter, code)
     return text
 

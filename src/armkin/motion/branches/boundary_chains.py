@@ -43,10 +43,10 @@ def add_boundary_chains(
     )
     for boundary in _boundary_samples(columns, chains):
         postures = columns.q[boundary][columns.valid[boundary]]
-        arriving = [part for chain in result for part in _chains_to(s, chain, boundary, postures, tolerance)]
+        arriving_chains = [part for chain in result for part in _chains_to(s, chain, boundary, postures, tolerance)]
         # A chain joined at an earlier boundary continues as one of `chains`, so these are all that leave.
-        leaving = [part for chain in chains for part in _chains_from(s, chain, boundary, postures, tolerance)]
-        new_chains = (_join_chains(a, b) for a, b in product(arriving, leaving) if _are_consecutive(a, b))
+        leaving_chains = [part for chain in chains for part in _chains_from(s, chain, boundary, postures, tolerance)]
+        new_chains = (_join_chains(a, b) for a, b in product(arriving_chains, leaving_chains) if _are_consecutive(a, b))
         result += islice(new_chains, max(_MAX_CHAINS - len(result), 0))
     postures = columns.q[last][columns.valid[last]]
     return _add_new_chains(

@@ -65,15 +65,15 @@ class Chain:
             elif not self.arm.prismatic[joint] and (np.isfinite(lower) or np.isfinite(upper)):
                 middle = np.rint((self.arm.home[joint] - value[0]) / turn)
                 offsets = turn * (middle + np.arange(-2, 3))
-            legal = (lowest[joint] + offsets >= lower) & (highest[joint] + offsets <= upper)
-            if len(offsets) and legal.all():
+            is_legal = (lowest[joint] + offsets >= lower) & (highest[joint] + offsets <= upper)
+            if len(offsets) and is_legal.all():
                 copies.append((offsets, None))
                 continue
             next_illegal = np.full((len(offsets), len(value)), len(value))
-            shifted = value + offsets[~legal, None]
-            illegal = (shifted < lower) | (shifted > upper)
+            shifted_values = value + offsets[~is_legal, None]
+            illegal = (shifted_values < lower) | (shifted_values > upper)
             illegal_sample = np.where(illegal, np.arange(len(value)), len(value))
-            next_illegal[~legal] = np.minimum.accumulate(illegal_sample[:, ::-1], axis=1)[:, ::-1]
+            next_illegal[~is_legal] = np.minimum.accumulate(illegal_sample[:, ::-1], axis=1)[:, ::-1]
             copies.append((offsets, next_illegal))
         return copies
 
@@ -125,9 +125,9 @@ class Chain:
             if not self.arm.prismatic[joint] and not np.isfinite([self.arm.lower[joint], self.arm.upper[joint]]).any():
                 offsets[joint] = turns[joint] * np.rint((near[joint] - value) / turns[joint])
                 continue
-            legal = choices if ends is None else choices[ends[:, i - self.first] > last - self.first]
+            legal_offsets = choices if ends is None else choices[ends[:, i - self.first] > last - self.first]
             nearest = near[joint] if fixed is None else fixed[joint]
-            offsets[joint] = legal[np.abs(value + legal - nearest).argmin()]
+            offsets[joint] = legal_offsets[np.abs(value + legal_offsets - nearest).argmin()]
         return np.asarray(self.q[i - self.first : last - self.first + 1] + offsets)
 
 
@@ -141,7 +141,7 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     open_chains: dict[int, list[tuple[int, int, int]]] = {
         int(column): [] for column in np.flatnonzero(valid[0])
     }  # column: blocks
-    ended: list[list[tuple[int, int, int]]] = []
+    ended_chains: list[list[tuple[int, int, int]]] = []
     begin = 0
     for event in events.tolist():
         for column, blocks in open_chains.items():
@@ -149,12 +149,16 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
         if event == N - 1:
             break
         partner = columns.partner[event]
-        continued = {int(partner[column]): blocks for column, blocks in open_chains.items() if partner[column] >= 0}
-        ended += [blocks for column, blocks in open_chains.items() if partner[column] < 0]
-        open_chains = {int(column): continued.get(int(column), []) for column in np.flatnonzero(valid[event + 1])}
+        continued_chains = {
+            int(partner[column]): blocks for column, blocks in open_chains.items() if partner[column] >= 0
+        }
+        ended_chains += [blocks for column, blocks in open_chains.items() if partner[column] < 0]
+        open_chains = {
+            int(column): continued_chains.get(int(column), []) for column in np.flatnonzero(valid[event + 1])
+        }
         begin = event + 1
-    ended += list(open_chains.values())
-    return [_assemble_chain(arm, columns, blocks) for blocks in ended]
+    ended_chains += list(open_chains.values())
+    return [_assemble_chain(arm, columns, blocks) for blocks in ended_chains]
 
 
 def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:

@@ -101,20 +101,20 @@ class Samples:
         if len(s) <= 2 * _STRIDE or self.solve_at(s[:1]).status[0] != Status.SINGULAR:
             return self.solve_at(s)
         sparse = np.append(np.arange(0, len(s) - 1, _STRIDE), len(s) - 1)
-        sampled = self.solve_at(s[sparse])
-        if (sampled.status == Status.SINGULAR).all():
+        sparse_columns = self.solve_at(s[sparse])
+        if (sparse_columns.status == Status.SINGULAR).all():
             self.stays = True
             return self.solve_at(s)
-        unreachable = sampled.status == Status.UNREACHABLE
+        unreachable = sparse_columns.status == Status.UNREACHABLE
         inner_rows = np.setdiff1d(np.arange(len(s)), sparse)
-        skipped = (unreachable[:-1] & unreachable[1:])[np.searchsorted(sparse, inner_rows) - 1]
-        parts = [sampled]
-        if not skipped.all():
-            parts.append(self.solve_at(s[inner_rows[~skipped]]))
-        if skipped.any():
+        is_skipped = (unreachable[:-1] & unreachable[1:])[np.searchsorted(sparse, inner_rows) - 1]
+        parts = [sparse_columns]
+        if not is_skipped.all():
+            parts.append(self.solve_at(s[inner_rows[~is_skipped]]))
+        if is_skipped.any():
             empty, lengths = (
-                sampled.take_rows(np.flatnonzero(unreachable)[[0] * int(skipped.sum())]),
-                s[inner_rows[skipped]],
+                sparse_columns.take_rows(np.flatnonzero(unreachable)[[0] * int(is_skipped.sum())]),
+                s[inner_rows[is_skipped]],
             )
             parts.append(replace(empty, s=lengths))
         columns = _concatenate(parts)
@@ -128,7 +128,7 @@ class Samples:
     def _solve_block(self, s: Array, examine: bool) -> Columns:
         """All branches at samples s (N,), on a singularity those 1e-7 of the length beside it."""
         solutions = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
-        q, name, legal = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
+        q, name, is_legal = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
         singular = np.flatnonzero(solutions.status == Status.SINGULAR)
         if len(singular):
             # Some joints are free exactly on a singularity, but determined 1e-7 of the path length beside it.
@@ -136,15 +136,15 @@ class Samples:
             s_beside = np.where(s_beside == s[singular], s[singular] - 1e-7 * self.length, s_beside)
             neighbours = ik(self.arm, self.targets(s_beside), self.task, near=self.near)
             # Keep the singular posture where its neighbour has no branch, for example with a stretched arm.
-            replaced = (neighbours.status != Status.SINGULAR) & neighbours.valid.any(axis=1)
+            is_replaced = (neighbours.status != Status.SINGULAR) & neighbours.valid.any(axis=1)
             B = max(q.shape[1], neighbours.q.shape[1])
-            q, name, legal = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(legal, B, 0).copy()
-            legal[singular[replaced]] = _pad(neighbours.within_limits, B, 0)[replaced]
-            q[singular[replaced]] = _pad(neighbours.q, B)[replaced]
-            name[singular[replaced]] = _pad(neighbours.branch.astype(np.int16), B, -1)[replaced]
-            if self.stays and len(stay := singular[~replaced]):
-                q[stay] = self._hold_free_joints(q[stay], self.targets(s[stay]), solutions.free[stay], legal[stay])
-        return _columns_by_name(solutions, s, q, name, legal)
+            q, name, is_legal = _pad(q, B).copy(), _pad(name, B, -1).copy(), _pad(is_legal, B, 0).copy()
+            is_legal[singular[is_replaced]] = _pad(neighbours.within_limits, B, 0)[is_replaced]
+            q[singular[is_replaced]] = _pad(neighbours.q, B)[is_replaced]
+            name[singular[is_replaced]] = _pad(neighbours.branch.astype(np.int16), B, -1)[is_replaced]
+            if self.stays and len(stay := singular[~is_replaced]):
+                q[stay] = self._hold_free_joints(q[stay], self.targets(s[stay]), solutions.free[stay], is_legal[stay])
+        return _columns_by_name(solutions, s, q, name, is_legal)
 
     def _hold_free_joints(self, q: Array, target: Array, free: Bool, within_limits: Bool) -> Array:
         """Singular postures (M, B, n) whose free joints (M, n) are moved as near as possible to `near`."""
@@ -158,8 +158,8 @@ class Samples:
         )
         postures /= arm.ratio
         others_rest = np.where(is_free, 0.0, np.abs(joint_change(arm, start, postures))).max(axis=1) < _MAX_MOVEMENT
-        accepted = others_rest & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
-        q[rows[accepted], branches[accepted]] = postures[accepted]
+        is_accepted = others_rest & (miss <= CONVERGING) & ~outside_limits(arm, postures).any(axis=1)
+        q[rows[is_accepted], branches[is_accepted]] = postures[is_accepted]
         return q
 
 
@@ -183,17 +183,17 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
     B = q.shape[1]
     width = max(B, int(name.max(initial=-1)) + 1)
     status, complete = solutions.status.astype(np.int8), bool(np.all(solutions.complete))
-    misplaced = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
+    misplaced_rows = np.flatnonzero(((name >= 0) & (name != np.arange(B))).any(axis=1))
     q, name, within_limits = (_pad(x, width, fill) for x, fill in ((q, np.nan), (name, -1), (within_limits, 0)))
-    if len(misplaced):
+    if len(misplaced_rows):
         q, name, within_limits = q.copy(), name.copy(), within_limits.copy()
-        old_q, old_name, old_within = q[misplaced], name[misplaced], within_limits[misplaced]
-        q[misplaced], name[misplaced], within_limits[misplaced] = np.nan, -1, False
+        old_q, old_name, old_within = q[misplaced_rows], name[misplaced_rows], within_limits[misplaced_rows]
+        q[misplaced_rows], name[misplaced_rows], within_limits[misplaced_rows] = np.nan, -1, False
         row, column = np.nonzero((old_name >= 0) & ~np.isnan(old_q[:, :, 0]))
         number = old_name[row, column]
-        q[misplaced[row], number] = old_q[row, column]
-        name[misplaced[row], number] = number
-        within_limits[misplaced[row], number] = old_within[row, column]
+        q[misplaced_rows[row], number] = old_q[row, column]
+        name[misplaced_rows[row], number] = number
+        within_limits[misplaced_rows[row], number] = old_within[row, column]
     return Columns(
         s=s, q=q, name=name, status=status, within_limits=within_limits, names=solutions.names, complete=complete
     )
@@ -201,8 +201,8 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
 
 def _pad(values: NDArray, B: int, fill: float = np.nan) -> NDArray:  # type: ignore[type-arg]
     """The values with B columns on axis 1 at least, the new ones `fill`."""
-    added = B - values.shape[1]
-    if added <= 0:
+    added_count = B - values.shape[1]
+    if added_count <= 0:
         return values
-    padding = np.full((values.shape[0], added, *values.shape[2:]), fill, values.dtype)
+    padding = np.full((values.shape[0], added_count, *values.shape[2:]), fill, values.dtype)
     return np.concatenate([values, padding], axis=1)

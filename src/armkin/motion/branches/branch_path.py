@@ -271,6 +271,6 @@ def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Arra
 def _drop_close_values(s: Array, min_step: float) -> Array:
     """Sorted values without those less than `min_step` behind their predecessor; the last value is kept."""
     keep = np.concatenate([[True], np.diff(s) > min_step])
-    separated = s[keep]
-    separated[-1] = s[-1]
-    return np.asarray(separated)
+    distinct_values = s[keep]
+    distinct_values[-1] = s[-1]
+    return np.asarray(distinct_values)

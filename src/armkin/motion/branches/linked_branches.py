@@ -117,9 +117,9 @@ class _Linking:
         left_ends = np.flatnonzero(~is_new)[1::3]
         columns.partner = columns.partner.copy()
         columns.partner[steps] = links[left_ends]
-        added = part_columns.take_rows(np.flatnonzero(is_new))
-        added.partner = links[is_new]
-        self.columns = columns.insert_rows(positions, added)
+        added_columns = part_columns.take_rows(np.flatnonzero(is_new))
+        added_columns.partner = links[is_new]
+        self.columns = columns.insert_rows(positions, added_columns)
 
     def divide(self) -> bool:
         """Divide the steps with unlinked branches or limit crossings once; False: none is left to divide.
@@ -146,13 +146,14 @@ class _Linking:
         self.fresh = np.insert(self.fresh, rows, True)
         self.added += len(lengths)
         self.columns = columns.insert_rows(rows, added_columns)
-        divided = np.zeros(len(columns.s) - 1, bool)
-        divided[steps] = True
-        self.open = np.insert(divided, rows, True)
-        self.torn = np.insert(self.torn & ~divided, rows, False)
-        self.both = np.insert(self.both & ~divided, rows, False)
-        self.crossing = np.insert(self.crossing & ~divided, rows, False)
-        first_parts = np.flatnonzero(divided) + (parts - 1) * np.arange(len(steps))  # first part of each divided step
+        is_divided = np.zeros(len(columns.s) - 1, bool)
+        is_divided[steps] = True
+        self.open = np.insert(is_divided, rows, True)
+        self.torn = np.insert(self.torn & ~is_divided, rows, False)
+        self.both = np.insert(self.both & ~is_divided, rows, False)
+        self.crossing = np.insert(self.crossing & ~is_divided, rows, False)
+        # first part of each divided step
+        first_parts = np.flatnonzero(is_divided) + (parts - 1) * np.arange(len(steps))
         self._link()
         self._give_up(first_parts[:, None] + np.arange(parts))
         return True
@@ -175,14 +176,14 @@ class _Linking:
         columns, first, end = self.columns, int(rows[0]), int(rows[-1]) + 1
         contiguous = end - first == len(rows)
         left, right = (slice(first, end), slice(first + 1, end + 1)) if contiguous else (rows, rows + 1)
-        certified, wrapped = self._certify(columns.q[left], columns.q[right], valid[left] & valid[right])
+        is_certified, is_wrapped = self._certify(columns.q[left], columns.q[right], valid[left] & valid[right])
         column = np.arange(columns.q.shape[1], dtype=np.int16)
-        columns.partner[rows] = np.where(certified, column, np.int16(-1))
-        all_linked = (certified == (valid[left] | valid[right])).all(axis=1)
+        columns.partner[rows] = np.where(is_certified, column, np.int16(-1))
+        all_linked = (is_certified == (valid[left] | valid[right])).all(axis=1)
         self.torn[rows], self.both[rows] = False, False
-        flips = (columns.within_limits[left] != columns.within_limits[right]) & certified
+        flips = (columns.within_limits[left] != columns.within_limits[right]) & is_certified
         if self.wide:
-            flips |= self._crossed_limits(columns.q, left, right, wrapped) & certified
+            flips |= self._crossed_limits(columns.q, left, right, is_wrapped) & is_certified
         self.crossing[rows] = flips.any(axis=1)
         for i in rows[~all_linked]:
             self._match_step(int(i), valid)
@@ -196,21 +197,21 @@ class _Linking:
         if self.scale is not None:
             D *= self.scale
         with np.errstate(invalid="ignore"):
-            certified = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
-        step, column = np.nonzero(present & ~certified)
-        wrapped = np.zeros(certified.shape, bool)
+            is_certified = self.top * np.einsum("mbi,mbi->mb", D, D) <= self.tolerance
+        step, column = np.nonzero(present & ~is_certified)
+        is_wrapped = np.zeros(is_certified.shape, bool)
         if len(step):
             change = joint_change(self.arm, a[step, column], b[step, column])
-            certified[step, column] = chord_bound(self.lever, change) <= self.tolerance
-            wrapped[step, column] = np.abs(b[step, column] - a[step, column] - change).max(axis=1) > 1.0
-        return certified, wrapped
+            is_certified[step, column] = chord_bound(self.lever, change) <= self.tolerance
+            is_wrapped[step, column] = np.abs(b[step, column] - a[step, column] - change).max(axis=1) > 1.0
+        return is_certified, is_wrapped
 
     def _match_step(self, i: int, valid: Bool) -> None:
         """Pair the branches of step i across columns: certified pairs, the smoothest first."""
         columns, arm = self.columns, self.arm
         left, right = np.flatnonzero(valid[i]), np.flatnonzero(valid[i + 1])
         D = joint_change(arm, columns.q[i, left][:, None], columns.q[i + 1, right][None])
-        certified = chord_bound(self.lever, D) <= self.tolerance
+        is_certified = chord_bound(self.lever, D) <= self.tolerance
         guess = np.zeros((len(left), arm.n))
         if i > 0 and columns.s[i] > columns.s[i - 1]:
             ratio = (columns.s[i + 1] - columns.s[i]) / (columns.s[i] - columns.s[i - 1])
@@ -218,16 +219,18 @@ class _Linking:
                 previous = np.flatnonzero(columns.partner[i - 1] == b)
                 if len(previous):
                     guess[row] = joint_change(arm, columns.q[i - 1, previous[0]], columns.q[i, b]) * min(ratio, 10.0)
-        cost = np.where(certified, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
+        cost = np.where(is_certified, np.linalg.norm(D - guess[:, None], axis=2), np.inf)
         columns.partner[i] = -1
         while np.isfinite(cost).any():
             a, b = np.unravel_index(int(cost.argmin()), cost.shape)
             columns.partner[i, left[a]] = right[b]
             cost[a, :], cost[:, b] = np.inf, np.inf
         # A branch that is outside the limits at this end carries nothing, so its partner does not matter.
-        unpaired, new_branches = left[columns.partner[i, left] < 0], np.setdiff1d(right, columns.partner[i])
-        self.torn[i] = columns.within_limits[i, unpaired].any() or columns.within_limits[i + 1, new_branches].any()
-        self.both[i] = self.torn[i] and len(unpaired) and len(new_branches)
+        unpaired_branches, new_branches = left[columns.partner[i, left] < 0], np.setdiff1d(right, columns.partner[i])
+        self.torn[i] = (
+            columns.within_limits[i, unpaired_branches].any() or columns.within_limits[i + 1, new_branches].any()
+        )
+        self.both[i] = self.torn[i] and len(unpaired_branches) and len(new_branches)
 
     def _crossed_limits(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
         """Whether a wide joint passes one of its limits (or a copy of it) on a step, for each column: (M, B)."""

@@ -115,9 +115,9 @@ def _graded_places(chords: Chords, is_used: Bool) -> tuple[Int, Array]:
     numbers, places = [np.repeat(long_chords, len(fractions))], [np.tile(fractions, len(long_chords))]
     for neighbour, side in ((left, 0), (right, 1)):
         distance = neighbour
-        while (pending := np.flatnonzero((neighbour < SHORT_SHARE * L) & (distance < 0.45 * L))).size:
-            numbers.append(pending)
-            f = distance[pending] / L[pending]
+        while (open_chords := np.flatnonzero((neighbour < SHORT_SHARE * L) & (distance < 0.45 * L))).size:
+            numbers.append(open_chords)
+            f = distance[open_chords] / L[open_chords]
             places.append(f if side == 0 else 1 - f)
             distance = np.where(distance < 0.45 * L, 2 * distance + neighbour, distance)
     return np.concatenate(numbers), np.concatenate(places)
@@ -176,13 +176,13 @@ def _refine_intervals(rows: FitRows, layout: Layout, misses: Array, is_astray: B
     divide = is_astray | (misfit > _HOPELESS_MISFIT) | ((misfit > 1.0) & (rounds[knots_before] >= _WEIGHING_ROUNDS))
     rounds[knots_before[misfit > 1.0]] += 1
     middle = (begins[:-1] + begins[1:]) // 2
-    divided = divide & (middle > begins[:-1]) & ~knot[middle]
-    knot[middle[divided]] = True
-    rounds[knots_before[divided]] = rounds[middle[divided]] = 0
-    is_reset = divided[layout.interval]
+    is_divided = divide & (middle > begins[:-1]) & ~knot[middle]
+    knot[middle[is_divided]] = True
+    rounds[knots_before[is_divided]] = rounds[middle[is_divided]] = 0
+    is_reset = is_divided[layout.interval]
     weight[is_reset] = rows.weight[is_reset]
-    raised = too_far & ~is_reset
-    weight[raised] = np.minimum(np.maximum(weight[raised], 0.05) * (1.4 * misses[raised]) ** 2, _MAX_WEIGHT)
+    is_raised = too_far & ~is_reset
+    weight[is_raised] = np.minimum(np.maximum(weight[is_raised], 0.05) * (1.4 * misses[is_raised]) ** 2, _MAX_WEIGHT)
 
 
 def _astray_intervals(rows: FitRows, layout: Layout, miss: Array, weight: Array) -> Bool:
@@ -197,6 +197,6 @@ def _astray_intervals(rows: FitRows, layout: Layout, miss: Array, weight: Array)
     products = np.bincount(interval, (miss_a * miss_b).sum(axis=0), M)
     size = np.bincount(interval, (miss_a**2).sum(axis=0), M)
     counts = np.bincount(interval, minlength=M)
-    weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # misfits there come from the raised weights
+    is_weighed = np.bincount(layout.interval, weight > rows.weight, M) > 0  # misfits there come from the raised weights
     noise = _NOISE_SHARE * rows.tolerance[0]
-    return np.asarray(~weighed & (counts >= _MIN_COUNT) & (products > 0.5 * size) & (size > counts * noise**2))
+    return np.asarray(~is_weighed & (counts >= _MIN_COUNT) & (products > 0.5 * size) & (size > counts * noise**2))

@@ -209,9 +209,9 @@ def _table_sizes(curve: Callable[[Array], tuple[Array, Array]], u: Array, scale:
     slopes = (curve(v.ravel())[1] * scale).reshape(*v.shape, -1)
     largest = np.abs(slopes).max(axis=(1, 2))
     length = np.linalg.norm(slopes, axis=2).mean(axis=1) * np.diff(u)
-    needed = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
+    count = np.ceil((length / _LENGTH_ERROR) ** 0.25)  # Hermite's error falls with the fourth power
     is_constant = np.abs(slopes - slopes[:, :1]).max(axis=(1, 2)) <= _EVEN_SLOPE * largest
-    return np.where(is_constant, 1, np.clip(needed, _MIN_TABLE_INTERVALS, table_intervals(len(u) - 1))).astype(np.intp)
+    return np.where(is_constant, 1, np.clip(count, _MIN_TABLE_INTERVALS, table_intervals(len(u) - 1))).astype(np.intp)
 
 
 def table_intervals(spans: int) -> int:

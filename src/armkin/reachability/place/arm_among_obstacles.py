@@ -42,8 +42,12 @@ def split_keep_outs(arm: Arm, scene: str | os.PathLike[str] | None) -> tuple[Arm
     own_entries, obstacles = arm.keep_out[:count], list(arm.keep_out[count:])
     clearance, sha256 = arm.clearance, arm.scene_sha256
     if scene is not None:
-        added = read_scene(os.fspath(scene))
-        obstacles, clearance, sha256 = [*obstacles, *added.keep_out], max(clearance, added.clearance), added.sha256
+        file_scene = read_scene(os.fspath(scene))
+        obstacles, clearance, sha256 = (
+            [*obstacles, *file_scene.keep_out],
+            max(clearance, file_scene.clearance),
+            file_scene.sha256,
+        )
     if not obstacles:
         return arm, Obstacles()
     self_entries = tuple(entry for entry in obstacles if entry.kind == "self")

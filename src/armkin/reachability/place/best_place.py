@@ -59,7 +59,7 @@ def limit_rooms(question: PlaceQuestion, x: Array, y: Array, yaws: Array) -> Roo
 def _limit_room(question: PlaceQuestion, position: Array, yaw: float) -> float:
     """Least distance to a joint limit over the reached targets, each on its best branch, as a share of the range."""
     question = at_value(question, position, yaw)
-    solutions, legal = free_from(question, position, yaw)
-    margins = np.where(legal, limit_margin(question.arm, solutions.q), -np.inf).max(axis=1, initial=-np.inf)
+    solutions, is_legal = free_from(question, position, yaw)
+    margins = np.where(is_legal, limit_margin(question.arm, solutions.q), -np.inf).max(axis=1, initial=-np.inf)
     reached_margins = margins[np.isfinite(margins)]
     return float(reached_margins.min()) if len(reached_margins) else 0.0

@@ -42,8 +42,8 @@ def branch_ranges(solutions: Solutions, is_free: Bool) -> tuple[Bool, Array, Arr
         is_complete = np.asarray(
             ~np.isnan(values).any(axis=(0, 2)) & ~(np.abs(step[:, :, revolute]) >= MAX_TURN).any(axis=(0, 2))
         )
-    unwrapped = np.concatenate([values[:1], values[:1] + np.cumsum(step, axis=0)])
-    return is_complete, unwrapped.min(axis=0), unwrapped.max(axis=0)
+    unwrapped_values = np.concatenate([values[:1], values[:1] + np.cumsum(step, axis=0)])
+    return is_complete, unwrapped_values.min(axis=0), unwrapped_values.max(axis=0)
 
 
 def some_copy_legal(arm: Arm, low: Array, high: Array, joints: range) -> Bool:

@@ -275,9 +275,13 @@ def _add_postures(question: PlaceQuestion, place: Place) -> Place:
     if plan is not None and plan.held:
         question = question._replace(values=tuple(plan.held.values()))
     held_question = at_value(question, position, yaw)
-    solutions, legal = free_from(held_question, position, yaw)
-    row = np.flatnonzero(legal.any(axis=1))
-    q = solutions.q[row, np.where(legal, solutions.motion, np.inf)[row].argmin(axis=1)] if len(row) else place.postures
+    solutions, is_legal = free_from(held_question, position, yaw)
+    row = np.flatnonzero(is_legal.any(axis=1))
+    q = (
+        solutions.q[row, np.where(is_legal, solutions.motion, np.inf)[row].argmin(axis=1)]
+        if len(row)
+        else place.postures
+    )
     if held_question.full_arm is None:
         return replace(place, postures=np.asarray(q))
     held = held_question.full_arm.joints

@@ -106,17 +106,17 @@ def _greatest_counts(question: PlaceQuestion, positions: Array) -> NDArray[np.in
     counts = np.zeros((len(positions), question.yaws), np.int64)
     has_keep_outs = question.arm.keep_out or question.obstacles.keep_out
     unobstructed = question._replace(arm=_drop_keep_outs(question.arm), obstacles=Obstacles())
-    pending = np.arange(len(positions))
+    open_positions = np.arange(len(positions))
     for value_question, free_question in zip(each_value(question), each_value(unobstructed), strict=True):
-        to_ask, free_counts = pending, reached_counts(free_question, positions[pending])
+        to_ask, free_counts = open_positions, reached_counts(free_question, positions[open_positions])
         if has_keep_outs:
-            to_ask = pending[(free_counts > counts[pending]).any(axis=1)]
+            to_ask = open_positions[(free_counts > counts[open_positions]).any(axis=1)]
         if len(to_ask):
             counts[to_ask] = np.maximum(
                 counts[to_ask], reached_counts(value_question, positions[to_ask]) if has_keep_outs else free_counts
             )
-        pending = pending[(counts[pending] < len(question.targets)).any(axis=1)]
-        if not len(pending):
+        open_positions = open_positions[(counts[open_positions] < len(question.targets)).any(axis=1)]
+        if not len(open_positions):
             break
     return counts
 
@@ -156,14 +156,14 @@ def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
     return lock(arm, {joint: value})
 
 
-def _count_targets(question: PlaceQuestion, positions: Array, legal: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _count_targets(question: PlaceQuestion, positions: Array, is_legal: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Number of legal targets, (P, N, K) -> (P, K); parts of a path without a common branch count as incomplete."""
     if not question.ways:
-        return np.asarray(legal.sum(axis=1, dtype=np.int64))
+        return np.asarray(is_legal.sum(axis=1, dtype=np.int64))
     counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
     for length in question.ways:
         part = slice(begin, begin + length)
-        count = legal[:, part].sum(axis=1, dtype=np.int64)
+        count = is_legal[:, part].sum(axis=1, dtype=np.int64)
         has_all = count == length
         for place in np.flatnonzero(has_all.any(axis=1)) if length > 1 else ():
             question_of_path = question._replace(targets=question.targets[part])
@@ -188,19 +188,19 @@ def _legal_yaws(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_]:
         and (read := _by_radius(question, positions)) is not None
     ):
         return read
-    legal = (_by_arcs if question.by_arcs else _yaw_by_yaw)(question, target, place)
-    return legal.reshape(len(positions), N, K)
+    is_legal = (_by_arcs if question.by_arcs else _yaw_by_yaw)(question, target, place)
+    return is_legal.reshape(len(positions), N, K)
 
 
 def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] | None:
     """Which targets are reached, (P, N, K), from solutions at sampled distances; None without a closed form."""
-    shifted = question.targets.copy()
+    shifted_goals = question.targets.copy()
     if question.task.position > 2:
-        shifted[:, 2] -= question.z
+        shifted_goals[:, 2] -= question.z
     turns: Array = np.asarray(np.arange(question.yaws) * question.step, float)
-    if (answer := by_radius(question.arm, question.task.name, shifted, positions, turns)) is None:
+    if (answer := by_radius(question.arm, question.task.name, shifted_goals, positions, turns)) is None:
         return None
-    legal, undecided = answer
+    is_legal, undecided = answer
     place_index, target_index, yaw_index = np.nonzero(undecided)
     for start in range(0, len(place_index), BLOCK_TARGETS):
         block = slice(start, start + BLOCK_TARGETS)
@@ -209,28 +209,28 @@ def _by_radius(question: PlaceQuestion, positions: Array) -> NDArray[np.bool_] |
         )
         yaw = turns[yaw_index[block]]
         goals = _turn_targets(question.task, shifted_targets, yaw, np.cos(yaw), np.sin(yaw))
-        legal[place_index[block], target_index[block], yaw_index[block]] = _any_legal(question, goals)
-    return legal
+        is_legal[place_index[block], target_index[block], yaw_index[block]] = _any_legal(question, goals)
+    return is_legal
 
 
 def _by_arcs(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """At which yaws targets (M,) are reached from places (M, 2), with one solve for each: (M, K)."""
-    legal = np.zeros((len(target), question.yaws), bool)
+    is_legal = np.zeros((len(target), question.yaws), bool)
     in_reach = np.flatnonzero(_within_reach(question, target, place, np.zeros(1))[:, 0])
     goals = _shift_targets(question._replace(targets=question.targets[target[in_reach]]), place[in_reach])
     rest_rows = np.arange(len(in_reach))
     if (blocks := columns(question.arm, goals, question.task.name)) is not None:
         edges = [rest_rows[:0]]
         for block in blocks:
-            legal[in_reach[block.rows]] = _legal_turns(question, block.values, block.valid)
+            is_legal[in_reach[block.rows]] = _legal_turns(question, block.values, block.valid)
             edges.append(block.rows.start + block.left)
         rest_rows = np.concatenate(edges)
     if len(rest_rows):
         solutions, rows = question.solve(question.arm, goals[rest_rows], question.task.name), in_reach[rest_rows]
-        legal[rows] = _legal_turns(question, list(solutions.q.transpose(2, 1, 0)), solutions.valid.T)
+        is_legal[rows] = _legal_turns(question, list(solutions.q.transpose(2, 1, 0)), solutions.valid.T)
         edge = rows[(solutions.status == Status.BOUNDARY) | (solutions.status == Status.SINGULAR)]
-        legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
-    return legal
+        is_legal[edge] = _yaw_by_yaw(question, target[edge], place[edge])
+    return is_legal
 
 
 def _legal_turns(question: PlaceQuestion, values: list[Array], valid: NDArray[np.bool_]) -> NDArray[np.bool_]:
@@ -245,7 +245,7 @@ def _legal_turns(question: PlaceQuestion, values: list[Array], valid: NDArray[np
 
 def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array) -> NDArray[np.bool_]:
     """At which yaws targets (M,) are reached from places (M, 2), with a solve for each yaw: (M, K)."""
-    K, legal = question.yaws, np.zeros((len(target), question.yaws), bool)
+    K, is_legal = question.yaws, np.zeros((len(target), question.yaws), bool)
     turns: Array = np.asarray(np.arange(K) * question.step, float)
     cosine, sine = np.cos(turns), np.sin(turns)
     block_size = max(BLOCK_TARGETS // K, 1)
@@ -256,13 +256,13 @@ def _yaw_by_yaw(question: PlaceQuestion, target: NDArray[np.intp], place: Array)
         goals = _turn_targets(
             question.task, shifted_targets[pair], turns[yaw_index], cosine[yaw_index], sine[yaw_index]
         )
-        legal[start + pair, yaw_index] = _any_legal(question, goals)
-    return legal
+        is_legal[start + pair, yaw_index] = _any_legal(question, goals)
+    return is_legal
 
 
 def _any_legal(question: PlaceQuestion, goals: Array) -> NDArray[np.bool_]:
     """Which targets, in the arm's frame, are reached by a branch within limits: (N,)."""
-    arm, legal, rest_rows = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
+    arm, has_legal, rest_rows = question.arm, np.zeros(len(goals), bool), np.arange(len(goals))
     isolated_answers = arm.n == question.task.constraints
     if isolated_answers and (blocks := columns(arm, goals, question.task.name)) is not None:
         edges = [rest_rows[:0]]
@@ -270,12 +270,12 @@ def _any_legal(question: PlaceQuestion, goals: Array) -> NDArray[np.bool_]:
             is_legal = block.valid
             for j in range(arm.n):
                 is_legal = is_legal & some_copy_legal(arm, block.values[j], j)
-            legal[block.rows] = is_legal.any(axis=0)
+            has_legal[block.rows] = is_legal.any(axis=0)
             edges.append(block.rows.start + block.left)
         rest_rows = np.concatenate(edges)
     if len(rest_rows):
-        legal[rest_rows] = question.solve(arm, goals[rest_rows], question.task.name).within_limits.any(axis=1)
-    return legal
+        has_legal[rest_rows] = question.solve(arm, goals[rest_rows], question.task.name).within_limits.any(axis=1)
+    return has_legal
 
 
 def _within_reach(question: PlaceQuestion, target: NDArray[np.intp], place: Array, turns: Array) -> NDArray[np.bool_]:

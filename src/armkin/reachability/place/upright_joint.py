@@ -67,7 +67,7 @@ def by_radius(
     """Which targets (N, m) with z relative to the places are reached from places (P, 2) at yaws (K,): (P, N, K), and
     which of the others have to be solved; None for an arm without a closed form."""
     N, K = len(targets), len(turns)
-    legal, undecided = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
+    is_legal, is_undecided = np.zeros((N, len(place) * K), bool), np.zeros((N, len(place) * K), bool)
     feet = _feet(arm, place, turns)
     for start in range(0, N, AT_ONCE):
         block = targets[start : start + AT_ONCE]
@@ -75,9 +75,9 @@ def by_radius(
             return None
         for i, target in enumerate(block):
             answers = _answers_from_feet(arm, radii.of_target(i), target, feet)
-            legal[start + i, answers.feet], undecided[start + i, answers.feet] = answers.reached, answers.to_ask
+            is_legal[start + i, answers.feet], is_undecided[start + i, answers.feet] = answers.reached, answers.to_ask
     shape = (N, len(place), K)
-    return legal.reshape(shape).transpose(1, 0, 2), undecided.reshape(shape).transpose(1, 0, 2)
+    return is_legal.reshape(shape).transpose(1, 0, 2), is_undecided.reshape(shape).transpose(1, 0, 2)
 
 
 def _feet(arm: Arm, place: Array, turns: Array) -> Feet:
