@@ -194,8 +194,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         slopes = _downhill_direction(arm, task, nearby, np.repeat(goal, 2 * n, axis=0)).reshape(len(points), 2, n, n)
         H = -(slopes[:, 0] - slopes[:, 1]) / (2 * tol.GRADIENT_WAY)
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
-        free_pairs = free[:, :, None] & free[:, None, :]
-        values, vectors = np.linalg.eigh(np.where(free_pairs, H, np.eye(n)))
+        values, vectors = np.linalg.eigh(np.where(free[:, :, None] & free[:, None, :], H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
         is_minimum = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL_CURVATURE)
         converged[active] = is_minimum
@@ -245,8 +244,7 @@ def _descend_by_damped_steps(arm: Arm, task: Task, q: Array, target: Array, step
         damping[active] = np.where(improved, np.maximum(damping[active] * 0.2, tol.MIN_DAMPING), damping[active] * 6.0)
         is_small_gain = gain <= tol.GAINS_NOTHING * np.maximum(cost[active], tol.MIN_COST)
         idle = improved & is_small_gain & (size < tol.LAST_STEP)
-        ended = idle | (damping[active] > 1e8)
-        active = active[~ended]
+        active = active[~(idle | (damping[active] > 1e8))]
         if not len(active):
             break
     return q

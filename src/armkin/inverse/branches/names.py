@@ -154,8 +154,7 @@ def _bent_wrist(arm: Arm, postures: Array) -> Array:
 def _elbow_heights(arm: Arm, q: Array) -> tuple[Array, Array]:
     """Height of the elbow in every branch, and a measure, low where the arm reaches far out and level: (M, B)."""
     shape = q.shape[:2]
-    flat = np.nan_to_num(q.reshape(-1, arm.n))
-    points = _joint_origins(arm, flat)
+    points = _joint_origins(arm, np.nan_to_num(q.reshape(-1, arm.n)))
     _, directions = joint_axes(Chain(arm.link, arm.prismatic))
     if abs(directions[min(arm.n, 3) - 1, 2]) >= 0.9:  # the elbow's axis is along the base's z
         # in the base's plane: to the left of the line from the first joint to the tool

@@ -144,8 +144,7 @@ class ThreeLink:
         R23 = L2[:3, :3] @ L3[:3, :3]
         self.height4 = float((L2[:3, 3] + L2[:3, :3] @ L3[:3, 3])[2])
         self.turned = [float(R23[0, 0]), float(R23[1, 0])]
-        fore = L2[:3, :3] @ L3[:3, 3]
-        self.two_link = TwoLink(L2[:2, 3], fore[:2], self.sense3)
+        self.two_link = TwoLink(L2[:2, 3], (L2[:3, :3] @ L3[:3, 3])[:2], self.sense3)
 
     def solve(
         self, p: list[Entry], x: list[Entry], prefer: Prefer, axis: int = 1
@@ -207,11 +206,9 @@ def _pitch(arm: Arm, task: Task, elbow: Elbow) -> ClosedForm:
     turned = pose.constant(link[2] @ link[3])
 
     def pitch(goal: list[Entry], prefer: Prefer) -> Candidates:
-        total = (goal[3] - task.offsets[0]) / task.sums[0][1]
-        c, s = arrays.cos_sin(total)
+        c, s = arrays.cos_sin((goal[3] - task.offsets[0]) / task.sums[0][1])
         if arm.n == 5:
-            q5 = (goal[4] - task.offsets[1]) / task.sums[1][4]
-            fifth = Pair(*arrays.cos_sin(q5))
+            fifth = Pair(*arrays.cos_sin((goal[4] - task.offsets[1]) / task.sums[1][4]))
             P = pose.compose(pose.rotate(past, *fifth), pose.constant(link[5]))
         else:
             fifth, P = None, past

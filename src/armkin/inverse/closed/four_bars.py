@@ -59,8 +59,7 @@ def dead_points(arm: Arm, q: Array, joints: Bool) -> tuple[Bool, Int]:
 def sides(arm: Arm, q: Array, joints: Bool, joint: Int) -> Bool:
     """The circuit of postures (M, n) on linkages, as the sign of the sine at a joint (M,): True if positive, (M,)."""
     four = np.nonzero(joints)[1].reshape(-1, 4)
-    sine = _linkages(arm, q, four).sine
-    return np.asarray((np.where(four == joint[:, None], sine, 0.0)).sum(axis=1) > 0.0)
+    return np.asarray(np.where(four == joint[:, None], _linkages(arm, q, four).sine, 0.0).sum(axis=1) > 0.0)
 
 
 def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:

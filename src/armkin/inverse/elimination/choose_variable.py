@@ -123,8 +123,7 @@ def _pencil_sequence(loop: Loop, rated: "list[_Rating]") -> tuple[Pencil, ...]:
     first = rated[0].pencil
     alternatives = [rating.pencil for rating in rated[1:] if rating.error < USELESS]
     # Equal roots of one joint are rarely equal in another: hide another joint early.
-    hidden_joint = first.hidden_joint
-    alternatives.sort(key=lambda pencil: pencil.hidden_joint == hidden_joint)
+    alternatives.sort(key=lambda pencil: pencil.hidden_joint == first.hidden_joint)
     other_offset = build_pencil(first.role, loop.links, loop.prismatic, PSI[1])
     plans = [first, *alternatives[:1], other_offset, *alternatives[1:]]
     while len(plans) < len(tol.SHAKES):

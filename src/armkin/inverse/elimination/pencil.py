@@ -163,8 +163,7 @@ def _coefficients(role: Role, part: Bool) -> Array:
 def _spurious(role: Role, part: Bool, monomials: Array) -> NDArray[np.complex128]:
     """K, the null space of M(i) that no pose changes, (p, r) orthonormal, from (2) as (15, 27)."""
     coefficients = _coefficients(role, part)
-    products = coefficients.shape[3]
-    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, -1, products)
+    _, M_c, M_s = np.einsum("ix,hxsp->hisp", monomials, coefficients).reshape(3, -1, coefficients.shape[3])
     _, size, vectors = np.linalg.svd(M_c + 1j * M_s)  # M(i) but for a factor, whatever psi
     null = vectors[size < tol.NULL_VALUE * size[0]].conj().T
     # Vectors of K that are (nearly) real would make [Re K, Im K] dependent: they stay in W.

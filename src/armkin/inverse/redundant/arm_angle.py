@@ -287,5 +287,4 @@ def _travel(samples: _Samples, circle: Int, first: Int, last: Int) -> Array:
     way = np.cumsum(np.tile(step, 2), axis=1)
     way = np.concatenate([np.zeros((len(way), 1)), way], axis=1)
     travel = way[circle, last] - way[circle, first]
-    is_round = last - first == step.shape[1]
-    return np.where(is_round, np.where(travel > np.pi, TURN, 0.0), travel)
+    return np.where(last - first == step.shape[1], np.where(travel > np.pi, TURN, 0.0), travel)

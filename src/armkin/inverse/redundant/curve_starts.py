@@ -153,8 +153,7 @@ def _off_curves_at(follower: Follower, j: int, value: float, points: Points, row
     q = np.insert(s.q[target, branch], j, value, axis=1)
     crossing, owner = _crossings(follower, j, value, points, row, after)
     order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(follower.target))
-    place = np.arange(int(count.max(initial=0)))
-    pair, k = np.nonzero(place < count[target, None])
+    pair, k = np.nonzero(np.arange(int(count.max(initial=0))) < count[target, None])
     index = order[(np.cumsum(count) - count)[target[pair]] + k]
     on_curve = np.zeros(len(q), bool)
     on_curve[pair[newton.wrapped_distance(follower.arm, q[pair], crossing[index]) < ON_CURVE]] = True

@@ -151,7 +151,8 @@ class _Rows:
         self.arm, self.joint = arm, joint
         self.near, self.stands = near, stands
         self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
-        self.parts: list[tuple[Int, Array, Array, Bool, Int]] = []
+        none = np.zeros(0, np.intp)
+        self.parts: list[tuple[Int, Array, Array, Bool, Int]] = [(none, near[:0], np.zeros((0, 2)), none > 0, none)]
         self.added = 0  # targets
 
     def add(self, curves: Curves) -> None:
@@ -181,8 +182,7 @@ class _Rows:
 
         All postures of a stretched arm may lie within less than a sample, or be one.
         """
-        answered = [part[0] for part in self.parts]
-        empty = ~np.isin(np.arange(len(target)), np.concatenate([np.zeros(0, np.intp), *answered]))
+        empty = ~np.isin(np.arange(len(target)), np.concatenate([part[0] for part in self.parts]))
         sought = empty & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
         for k in np.flatnonzero(empty & (self.stands | sought)).tolist():
             q, goal = self.near[k][None], target[[k]]
@@ -199,16 +199,14 @@ class _Rows:
     def stack_parts(self) -> tuple[Array, Array, Bool, NDArray[np.int8]]:
         """q (N, B, n), intervals (N, B, 2), whether legal and the branch (N, B), -1 where there is no row."""
         N, n = self.near.shape
-        row = np.concatenate([np.zeros(0, np.intp), *(part[0] for part in self.parts)])
-        order = np.argsort(row, kind="stable")
-        count = np.bincount(row, minlength=N)
+        row, *columns = (np.concatenate(column) for column in zip(*self.parts, strict=True))
+        order, count = np.argsort(row, kind="stable"), np.bincount(row, minlength=N)
         B = int(count.max(initial=0))
         cells = row[order], numbers_within(count)
         q, interval = np.full((N, B, n), np.nan), np.full((N, B, 2), np.nan)
         legal, branch = np.zeros((N, B), bool), np.full((N, B), -1, np.int8)
-        if len(row):
-            for k, array in enumerate((q, interval, legal, branch), 1):
-                array[cells] = np.concatenate([part[k] for part in self.parts])[order]
+        for array, column in zip((q, interval, legal, branch), columns, strict=True):
+            array[cells] = column[order]
         return q, interval, legal, branch
 
 

@@ -171,8 +171,7 @@ def flat_minima(arm: Arm, q: Array, target: Array) -> Bool:
     """Whether minima (M, n) of one target lie on a curve of such."""
     box = box_of(arm)
     local = _local(arm, box, q, np.broadcast_to(target, (len(q), 4, 4)))
-    at_limit = (q <= box.lower) | (q >= box.upper)
-    tangent = _tangent(local, at_limit)
+    tangent = _tangent(local, (q <= box.lower) | (q >= box.upper))
     values, vectors = np.linalg.eigh(tangent.H)
     in_tangent = np.linalg.norm(tangent.P @ vectors, axis=1) > 0.5
     return np.asarray((in_tangent & (np.abs(values) <= tol.LEVEL_CURVATURE)).any(axis=1))

@@ -146,9 +146,8 @@ def _decide_by_cubic(offset: Array, inverse: Array, end_inverse: Array) -> tuple
 def _by_curvature(goals: Goals, q: Array, inverse: Array, beside: Array) -> tuple[Bool, Bool]:
     """Which weak postures (M, n) without a neighbour are isolated roots, where g exceeds `SOLUTION` before an extremum,
     and which are boundaries, where the extremum comes first."""
-    n = q.shape[1]
     # the columns of J^-1 are nearly along the lost direction v, the longest one most
-    joint_rows = inverse[:, :n]
+    joint_rows = inverse[:, : q.shape[1]]
     longest = (joint_rows * joint_rows).sum(axis=1).argmax(axis=1)
     v = np.take_along_axis(joint_rows, longest[:, None, None], axis=2)
     v = _unit_rows((joint_rows @ (joint_rows.swapaxes(1, 2) @ v)).swapaxes(1, 2))[:, 0]

@@ -82,8 +82,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     U, S, V = np.linalg.svd(J)
     u, step = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     ends = np.concatenate([q + step, q - step])
-    goals = np.concatenate([target, target])
-    forward, backward = np.split(newton.residuals(arm, task, ends, goals), 2)
+    forward, backward = np.split(newton.residuals(arm, task, ends, np.concatenate([target, target])), 2)
     bend = (u * (forward + backward - 2.0 * r)).sum(axis=1) / tol.FOLD_WAY**2
     along_u = (u * r).sum(axis=1)
     remainder = np.linalg.norm(r - along_u[:, None] * u, axis=1) / np.maximum(S[:, -2], tol.HIGH_ORDER)

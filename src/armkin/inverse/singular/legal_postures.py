@@ -83,8 +83,7 @@ def with_free_postures(goals: Goals, batch: Batch) -> Batch:
     arm, task, target, near = goals
     is_free = hits_nothing(arm, batch.q) & batch.within
     for k, b in np.argwhere((batch.status == Status.SINGULAR)[:, None] & batch.valid & ~is_free):
-        postures = follow_self_motion(arm, task, batch.q[k, b], target[k])
-        rows, inside = nearest_row(arm, postures, near[k])
+        rows, inside = nearest_row(arm, follow_self_motion(arm, task, batch.q[k, b], target[k]), near[k])
         candidates = np.flatnonzero(inside)
         candidates = candidates[hits_nothing(arm, rows[candidates])]
         if len(candidates):

@@ -154,8 +154,7 @@ def _solve(source: Recorded, gap: float, elimination: Callable[[], Geometry | No
             result = result._replace(q=widen_columns(result.q, q.shape[1]))
             result.q[rows] = q
         return result
-    branches = _by_neighbours(source, gap, gaps, elimination, target)
-    return Rows(*branches, np.zeros(len(target), bool))
+    return Rows(*_by_neighbours(source, gap, gaps, elimination, target), np.zeros(len(target), bool))
 
 
 def _by_neighbours(
@@ -231,8 +230,7 @@ def _correct_seeds(source: Recorded, gap: float, gaps: Array, target: Array) -> 
         doubt = doubt | doubt_there | (((miss < limit) | real) & ~near_seed).any(axis=1)
     goals = np.repeat(target, B, axis=0)
     seeds = seed.reshape(-1, n)
-    misses = newton.misses(arm, task, seeds, goals)
-    rows = np.flatnonzero(misses < tol.HOPELESS)
+    rows = np.flatnonzero(newton.misses(arm, task, seeds, goals) < tol.HOPELESS)
     q, size = seeds.copy(), np.full(N * B, np.inf)
     q[rows], size[rows] = newton.correct(arm, task, seeds[rows], goals[rows])
     branch, valid = q.reshape(N, B, n), (size <= tol.ANSWERED).reshape(N, B)

@@ -104,8 +104,7 @@ def _pairs(arm: Arm, seed: Array, doubtful: Bool, partners: Int) -> tuple[Int, I
 
 def _merged_branches(arm: Arm, q: Array) -> Bool:
     """Which branches (N, B, n) all but meet another one: (N, B)."""
-    equal = newton.distances(arm, q, q) < tol.APART_ROOTS
-    return np.asarray(equal.sum(axis=2) > 1)
+    return np.asarray((newton.distances(arm, q, q) < tol.APART_ROOTS).sum(axis=2) > 1)
 
 
 def _branch_partners(source: Recorded) -> Int:

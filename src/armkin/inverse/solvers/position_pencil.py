@@ -48,8 +48,7 @@ class PositionPencil:
     """The equations of an arm of three turning joints, prepared."""
 
     def __init__(self, arm: Arm, task: Task) -> None:
-        tip = arm.link[3][:3, 3]
-        position = Position(Chain(arm.link, arm.prismatic), tip, tol.EXACT, 0.0)
+        position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tol.EXACT, 0.0)
         self.arm, self.task, self.scale = arm, task, position.scale
         self.from_base, self.rest = inverse(arm.link[0]), position.rest
         self.weights = np.array([[1.0, 0.0], [0.0, 1.0 / position.scale]])
@@ -148,5 +147,4 @@ def _solve_chunk(pencil: PositionPencil, target: Array) -> Rows:
 def _root_order(distances: Array) -> Int:
     """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
     distances = np.where(np.isnan(distances), np.pi, distances)
-    cost = distances[:, np.arange(4), ORDERS].sum(axis=2)
-    return np.asarray(ORDERS[cost.argmin(axis=1)])
+    return np.asarray(ORDERS[distances[:, np.arange(4), ORDERS].sum(axis=2).argmin(axis=1)])

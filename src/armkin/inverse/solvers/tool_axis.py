@@ -22,8 +22,7 @@ def recognise(arm: Arm, task: Task, class_of: Callable[[Arm], Geometry]) -> Geom
     """Five joints of any geometry; class_of: the class of an arm of six joints for full poses."""
     if task.name != "xyz_axis" or arm.n != 5:
         return None
-    six = from_links([*arm.link, np.eye(4)], [*arm.prismatic, False])
-    inner = class_of(six)
+    inner = class_of(from_links([*arm.link, np.eye(4)], [*arm.prismatic, False]))
     reason = f"with a virtual joint about the tool's axis: {inner.why}"
     if inner.pairs is not None:
         solve = inner.pairs

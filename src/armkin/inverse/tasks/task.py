@@ -189,8 +189,7 @@ def shifted_targets(arm: Arm, task: Task, target: Array, shift: Array) -> Array:
         targets[:, :3, :3] = np.linalg.qr(spin)[0] * np.sign(np.diag(np.linalg.qr(spin)[1])) @ target[:, :3, :3]
         return targets
     targets[:, : task.position] += shift[: task.position] * arm.reach
-    angles = targets.shape[1] - task.position
-    targets[:, task.position :] += shift[3 : 3 + angles]
+    targets[:, task.position :] += shift[3 : 3 + (targets.shape[1] - task.position)]
     if task.orientation == "axis":
         targets[:, 3:] /= np.linalg.norm(targets[:, 3:], axis=1, keepdims=True)
     return targets
