@@ -54,7 +54,7 @@ def runs(flags: Bool, breaks: Bool) -> tuple[Int, Int, Int]:
     begins = flags & (breaks | ~np.roll(flags, 1, axis=1))
     begins[:, 0] |= (flags & ~breaks).all(axis=1)
     row, first = np.nonzero(begins)
-    stops = np.flatnonzero(breaks | ~flags)
+    stops = np.flatnonzero(breaks | ~flags)  # samples, counted over all rows, at which a run before them is over
     # the next stop behind the first sample, or round the end the first one of the row
     begin, end = np.searchsorted(stops, K * np.arange(M)), np.append(stops, M * K)
     stop = end[np.searchsorted(stops, K * row + first + 1)]

@@ -41,12 +41,12 @@ class _Rays(NamedTuple):
 
 
 class _Curves:
-    """Nodes of curves, and to which half each of their halves (see `Nodes`) is joined: `partner`, -1 if to none."""
+    """Nodes of curves, and which halves are joined: half 2 m leaves node m along its tangent, 2 m + 1 against it."""
 
     def __init__(self, follower: Follower, owner: Int, q: Array) -> None:
         self.follower = follower
         self.planes, self.nodes, grid = answers_on_planes(follower, owner, q)
-        self.partner = np.full(2 * len(self.nodes.row), -1)
+        self.partner = np.full(2 * len(self.nodes.row), -1)  # the half that each is joined to, -1: none yet
         self.traced = np.zeros(len(self.partner), bool)  # a half whose ray was lost would lose it again
         next_plane = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
         following = np.take_along_axis(grid, next_plane[:, :, None], axis=1)

@@ -56,7 +56,7 @@ def equal_candidates(
         miss, weakest = (np.where(longer, values[second], values[first]) for values in (size, sigma))
         solves = solves_between(arm, task, start, offset, miss, weakest, target[k[row]])
         alike[row, column] = solves
-        for i in np.unique(row[solves]):  # rounding alone parts others from these, which are one with them, too
+        for i in np.unique(row[solves]):  # candidates that rounding alone parts from these are of that root, too
             postures, equals = q[k[i]], np.flatnonzero(alike[i])
             distances = newton.wrapped_distance(arm, postures[:, None], postures[equals])
             close = distances < _rounding_radius(np.minimum(sigma[k[i]][:, None], sigma[k[i], equals]))
