@@ -19,7 +19,7 @@ PYARROW_ROWS = 2_000  # rows from which on pyarrow is worth its import
 ROWS = 8_192  # rows printed at once: their texts stay in the cache, and no memory is asked for again
 
 
-# Prints all rows of a table: between[i] stands before column i, the last one at the end; how words are quoted, and
+# Prints all rows of a table: separators[i] stands before column i, the last one at the end; how words are quoted, and
 # what stands for nan.
 Lines = Callable[[Table, list[str], Callable[[Any], str], str], bytes]
 
@@ -51,7 +51,7 @@ def _print_lines(table: Table, separators: list[str], quote: Callable[[Any], str
 
 
 def _column_texts(column: Column, quote: Callable[[Any], str], missing_text: str) -> list[str]:
-    """The texts of a column; missing: what stands for nan."""
+    """The texts of a column; missing_text: what stands for nan."""
     if isinstance(column, Words):
         names = [*map(quote, column.names), missing_text]
         return [names[i] for i in column.index.tolist()]
@@ -79,7 +79,7 @@ def _import_arrow() -> Any:
 def _print_by_arrow(
     pa: Any, table: Table, separators: list[str], quote: Callable[[Any], str], missing_text: str
 ) -> bytes:
-    """The rows as bytes, texts joined by Arrow; between: what stands around each column."""
+    """The rows as bytes, texts joined by Arrow; separators: what stands around each column."""
     pieces = [_arrow_texts(pa, column, quote, missing_text) for column in table.values()]
     if len(set(separators[1:-1])) <= 1 and not separators[0]:  # one separator: half as many pieces to join
         lines = pa.compute.binary_join_element_wise(*pieces, pa.scalar(separators[1]))

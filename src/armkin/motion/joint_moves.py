@@ -109,11 +109,11 @@ def check_jerk(arm: Arm, jerk: ArrayLike | None) -> Array | None:
 
 def missing_rates(arm: Arm) -> dict[str, list[str]]:
     """Keys that motion needs and the robot file lacks: {"max_speed": [joint, ...], ...}."""
-    lacking = {
+    joints_of_key = {
         key: [name for name, value in zip(arm.joint_names, values, strict=True) if np.isnan(value)]
         for key, values in (("max_speed", arm.max_speed), ("max_accel", arm.max_accel))
     }
-    return {key: names for key, names in lacking.items() if names}
+    return {key: names for key, names in joints_of_key.items() if names}
 
 
 _EXAMPLES = {("deg", "max_speed"): 30, ("deg", "max_accel"): 60, ("mm", "max_speed"): 20, ("mm", "max_accel"): 50}
@@ -136,10 +136,10 @@ def rate_lines(arm: Arm) -> list[str]:
 
 def check_rates(arm: Arm) -> None:
     """Raise UsageError, naming every joint, if a max_speed or max_accel is missing."""
-    lacking = missing_rates(arm)
-    if lacking:
+    joints_of_key = missing_rates(arm)
+    if joints_of_key:
         complaints = [f"joint{'s' * (len(names) > 1)} {', '.join(names)} ha{'ve' if len(names) > 1 else 's'} no {key}"
-                   for key, names in lacking.items()]  # fmt: skip
+                   for key, names in joints_of_key.items()]  # fmt: skip
         lines = rate_lines(arm)
         raise UsageError(
             f"{', '.join(complaints)}: motion needs {'them' if len(lines) > 1 else 'one'}{_advice_to_add(arm, lines)}",

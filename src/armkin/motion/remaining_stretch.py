@@ -22,8 +22,8 @@ _TIME_STEP = 0.002  # step [s] of the plan's time between two grid points
 _SHORT_TIME = 0.05  # a remainder below this time [s] is slow and nearly straight
 
 
-def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stretch:
-    """The part of a stretch from its time `begin` [s] on, for an arm at rest at joint values `standing` (n,).
+def remainder(arm: Arm, stretch: Stretch, begin: float, present: Array) -> Stretch:
+    """The part of a stretch from its time `begin` [s] on, for an arm at rest at joint values `present` (n,).
 
     It follows the plan's own time law after a run-up, in which the plan's time s passes at a rate that grows from 0 to
     1. The joints' accelerations bound that growth: |q'(s) u + q''(s) x| <= max_accel with x = (ds/dt)^2 and u half its
@@ -31,17 +31,17 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, standing: Array) -> Stre
     """
     time_left = stretch.duration - begin
     if np.array_equal(stretch.start, stretch.end):
-        if np.array_equal(pulses(arm, standing), pulses(arm, stretch.end)):
+        if np.array_equal(pulses(arm, present), pulses(arm, stretch.end)):
             return Straight(stretch.end, stretch.end, rest_profile(max(time_left, 0.0)))  # a pause
-        return straight_move(arm, standing, stretch.end)
+        return straight_move(arm, present, stretch.end)
     if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
         share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)
         # Rounding to whole steps changes the joints' shares on a short path, so each keeps its own limits, too.
-        fastest = straight_move(arm, standing, stretch.end).law
+        fastest = straight_move(arm, present, stretch.end).law
         peak, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
-        return Straight(standing, stretch.end, trapezoid(1.0, peak, accel) if fastest.length else fastest)
+        return Straight(present, stretch.end, trapezoid(1.0, peak, accel) if fastest.length else fastest)
     if time_left < _SHORT_TIME:
-        return straight_move(arm, standing, stretch.end)
+        return straight_move(arm, present, stretch.end)
     s = _grid_times(stretch, begin)
     path = Knots(s, stretch.evaluate(s), stretch.evaluate(s, 1))
     return Curve(path, _run_up(arm, path))

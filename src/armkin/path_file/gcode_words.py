@@ -63,7 +63,7 @@ def _strip_checksum(line: str, raw: str, name: str, number: int) -> str:
 
 
 def _why_no_words(line: str, dense_line: str) -> str:
-    """What is wrong with a line that is more than words; packed: the line without its blanks."""
+    """What is wrong with a line that is more than words; dense_line: the line without its blanks."""
     index = 0
     while (word := _WORD.match(dense_line, index)) is not None:
         index = word.end()

@@ -161,7 +161,7 @@ class _Drawer:
     line: int = 0
 
     def draw(self, element: _Element, transform: Matrix, element_of_id: dict[str, _Element], depth: int) -> None:
-        """An element and all in it; m: from where it stands to millimetres."""
+        """An element and all in it; transform: from where it stands to millimetres."""
         if not self._is_drawn(element, depth):
             return
         try:

@@ -103,7 +103,7 @@ def add_keep_out_schema(schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def schema_of_model(model: type[BaseModel], title: str, **keys: Any) -> dict[str, Any]:
-    """The schema of a kind of file; more: keys that stand before those of the model."""
+    """The schema of a kind of file; keys: what stands before those of the model."""
     model_schema = _tidy_schema(model.model_json_schema(schema_generator=_Generator))
     return {"$schema": "https://json-schema.org/draft/2020-12/schema", "title": title, **keys, **model_schema}
 

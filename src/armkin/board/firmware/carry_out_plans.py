@@ -36,7 +36,7 @@ class _UnderWay:
     def add(self, frames: int, seconds: float, plan: Cut, number: int, taken_frames: int) -> None:
         """Add a move of a plan; frames, seconds: those before it.
 
-        taken: number of frames that the board has taken; moves before the last such frame are finished.
+        taken_frames: number of frames that the board has taken; moves before the last such frame are finished.
         """
         self._moves.append((frames, seconds, plan, number))
         self._forget_finished(taken_frames)

@@ -50,7 +50,7 @@ class InputRows:
         named: Mapping[str, Sequence[float]] | None = None,
         values: Sequence[Sequence[float]] = (),
     ) -> None:
-        """source: a name, or None for given values; others: see `csv_to_numbers.Columns`."""
+        """source: a name, or None for given values; the others: see `csv_to_numbers.Columns`."""
         self.source, self.names, self.purpose = source, tuple(names), purpose
         self.named, self.values = named, values
         if source is not None:

@@ -55,7 +55,7 @@ def percent(text: str, option: str) -> float:
 
 
 def standard_input(max_bytes: int, advice: str = "") -> bytes:
-    """All of standard input, at most `max_bytes`; instead: advice for a longer one.
+    """All of standard input, at most `max_bytes`; advice: for a longer one.
 
     Raises FileError if it is closed or cannot be read, UsageError if it is longer.
     """

@@ -34,7 +34,7 @@ _TARGETS = "; targets are solved first: armkin ik ROBOT --batch FILE --continuou
 class Columns:
     """Where each number stands in a line, learnt from the first line that is neither empty nor a comment.
 
-    names: what the numbers are called; what: who wants them, for messages; named: values that one word stands
+    names: what the numbers are called; purpose: who wants them, for messages; named: values that one word stands
     for (poses). A heading may have other columns, too, and any order; `x_mm`, `x/mm` and a trace's `tool_x_mm`
     are x. A row whose wanted cells are all empty (a target that `ik` did not reach) is skipped and counted.
     """
@@ -133,7 +133,7 @@ def batch_rows(
 ) -> Iterator[Chunk]:
     """Rows of a CSV file, or of standard input for "-", in chunks.
 
-    names, what, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
+    names, purpose, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
     files.protect_input(0 if source == "-" else source)  # must precede the opening of an output of that name

@@ -20,7 +20,7 @@ _waiting: list[tuple[str, str]] | None = None  # under --json: notes and warning
 def destination(path: str | None, content: str = "", endings: Sequence[str] = ()) -> Iterator[Write]:
     """The function that writes a command's data: to stdout ("-"), or to a file that appears whole or not at all.
 
-    what, endings: what is written, and how the file's name may end (`file_ending`), where no option has checked it.
+    content, endings: what is written, and how the file's name may end (`file_ending`), where no option has checked it.
     """
     from armkin.errors import FileError, UsageError
 

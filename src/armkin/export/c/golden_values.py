@@ -28,7 +28,7 @@ _CLEAR = 0.02  # singular value, lengths in reaches, from which on a posture is 
 def golden_test(arm: Arm, task: Task, text: str, single: bool, has_names: bool) -> str:
     """The text of a test program with its values filled in; fields that the other files share stay as they are.
 
-    named: branches are numbered as Python numbers them; else their numbers are not compared (-1).
+    has_names: branches are numbered as Python numbers them; else their numbers are not compared (-1).
     """
     q = _postures(arm, task, POSTURES)
     T = fk(arm, q)

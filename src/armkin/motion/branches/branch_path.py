@@ -252,8 +252,8 @@ def _speed_caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array,
 
 def coupled_motors(arm: Arm, share: float) -> tuple[Array, Array] | None:
     """The gains and greatest accelerations [counts] of motors that drive several joints; None: there are none."""
-    shared = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
-    return (np.asarray(arm.motor_gain[shared]), motor_accel(arm)[shared] * share) if len(shared) else None
+    coupled = np.flatnonzero(np.count_nonzero(arm.motor_gain, axis=1) > 1)
+    return (np.asarray(arm.motor_gain[coupled]), motor_accel(arm)[coupled] * share) if len(coupled) else None
 
 
 def _smoothing_cap(arm: Arm, path: Knots, mean: float, tolerance: float) -> Array:

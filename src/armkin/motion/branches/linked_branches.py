@@ -232,22 +232,22 @@ class _Linking:
         )
         self.both[i] = self.torn[i] and len(unpaired_branches) and len(new_branches)
 
-    def _crossed_limits(self, q: Array, starts: Int | slice, ends: Int | slice, wrapped: Bool) -> Bool:
+    def _crossed_limits(self, q: Array, starts: Int | slice, ends: Int | slice, is_wrapped: Bool) -> Bool:
         """Whether a wide joint passes one of its limits (or a copy of it) on a step, for each column: (M, B)."""
-        crossed = wrapped.copy()
+        is_crossed = is_wrapped.copy()
         for joint in self.wide:
             value = q[:, :, joint]
             for limit in (self.arm.lower[joint], self.arm.upper[joint]):
-                crossed |= np.floor((value[starts] - limit) / self.turn[joint]) != np.floor(
+                is_crossed |= np.floor((value[starts] - limit) / self.turn[joint]) != np.floor(
                     (value[ends] - limit) / self.turn[joint]
                 )
-        step, column = np.nonzero(wrapped)  # steps on which a joint wraps round by a whole turn
+        step, column = np.nonzero(is_wrapped)  # steps on which a joint wraps round by a whole turn
         if len(step):
             start, end = q[starts][step, column], q[ends][step, column]
             unwrapped_end = start + joint_change(self.arm, start, end)
-            crossed[step, column] = False
+            is_crossed[step, column] = False
             for joint in self.wide:
                 for limit in (self.arm.lower[joint], self.arm.upper[joint]):
                     n0, n1 = (np.floor((x[:, joint] - limit) / self.turn[joint]) for x in (start, unwrapped_end))
-                    crossed[step, column] |= n0 != n1
-        return crossed
+                    is_crossed[step, column] |= n0 != n1
+        return is_crossed

@@ -66,14 +66,14 @@ def refine_grid(
     resting = _nearest_indices(points[breaks], branch.stops)
     max_points = _MAX_POINT_FACTOR * len(points)
     for damping in DAMPING:
-        coarser, previous = None, None
+        coarser_path, previous = None, None
         for _ in range(_MAX_ROUNDS):
-            values = _solve_points(arm, branch, points, damping, coarser)
+            values = _solve_points(arm, branch, points, damping, coarser_path)
             rests = breaks[resting]
-            exact_path = exact_cubics(arm, route, points, values, rests, coarser) if exact else None
+            exact_path = exact_cubics(arm, route, points, values, rests, coarser_path) if exact else None
             if exact and exact_path is None:
                 return refine_grid(arm, branch, number, tolerance, exact=False)
-            path = coarser = exact_path or knots_of_samples(points, values, breaks.tolist(), rests.tolist())
+            path = coarser_path = exact_path or knots_of_samples(points, values, breaks.tolist(), rests.tolist())
             if tolerance is None:
                 return path, np.zeros(len(path.h))
             deviations = interval_deviations(arm, route, path, previous)
@@ -176,26 +176,26 @@ def _divide_intervals(points: Array, breaks: Int, parts: Int) -> tuple[Array, In
     return np.append(divide_spans(points, parts), points[-1]), begin[breaks]
 
 
-def _solve_points(arm: Arm, branch: BranchSamples, points: Array, damping: float, coarser: Knots | None) -> Array:
-    """Joint values that solve the targets at the points; coarser: a solved grid whose points are among them."""
+def _solve_points(arm: Arm, branch: BranchSamples, points: Array, damping: float, coarser_path: Knots | None) -> Array:
+    """Joint values that solve the targets at the points; coarser_path: a solved grid whose points are among them."""
     route, windows = branch.route, branch.windows
     # column order, as joints are evaluated one by one
-    values, pending = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)
-    if coarser is not None:
-        positions = np.searchsorted(points, coarser.s)
-        values[positions], pending[positions] = coarser.q, False
-    if coarser is None or windows:
-        guess = np.stack([np.interp(points[pending], branch.s, branch.q[:, j]) for j in range(arm.n)], axis=1)
+    values, is_pending = np.empty((len(points), arm.n), order="F"), np.ones(len(points), bool)
+    if coarser_path is not None:
+        positions = np.searchsorted(points, coarser_path.s)
+        values[positions], is_pending[positions] = coarser_path.q, False
+    if coarser_path is None or windows:
+        guess = np.stack([np.interp(points[is_pending], branch.s, branch.q[:, j]) for j in range(arm.n)], axis=1)
     else:  # its cubics are closer than chords of the samples
-        guess, _ = coarser.evaluate(points[pending])
-    values[pending] = correct_to_route(arm, route.task, guess, route.targets(points[pending]), damping)
+        guess, _ = coarser_path.evaluate(points[is_pending])
+    values[is_pending] = correct_to_route(arm, route.task, guess, route.targets(points[is_pending]), damping)
     for window in windows:
         if window.detour is not None:  # the targets of the route contain the detour
             continue
-        in_window = pending & (points > window.begin) & (points < window.end)
+        in_window = is_pending & (points > window.begin) & (points < window.end)
         if in_window.any():
             values[in_window] = window.joints(
-                arm, route, points[in_window], window.turns_to_copy(arm, guess[in_window[pending]][0])
+                arm, route, points[in_window], window.turns_to_copy(arm, guess[in_window[is_pending]][0])
             )
     return values
 
@@ -213,7 +213,7 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Kno
     levers bound. previous: a coarser grid and its distances, which are reused for unchanged cubics.
     """
     lever, deviations = levers(arm), np.zeros(len(path.h))
-    pending = path.s[1:] > path.s[:-1]
+    is_pending = path.s[1:] > path.s[:-1]
     if previous is not None:
         old_path, distances = previous
         positions = np.searchsorted(path.s, old_path.s)
@@ -222,8 +222,8 @@ def interval_deviations(arm: Arm, route: Route, path: Knots, previous: tuple[Kno
         )
         same_slopes = (path.d.T.take(positions, axis=1) == old_path.d.T).all(axis=0)
         unchanged = np.flatnonzero((positions[1:] == positions[:-1] + 1) & same_slopes[1:] & same_slopes[:-1])
-        deviations[positions[unchanged]], pending[positions[unchanged]] = distances[unchanged], False
-    intervals = np.flatnonzero(pending)
+        deviations[positions[unchanged]], is_pending[positions[unchanged]] = distances[unchanged], False
+    intervals = np.flatnonzero(is_pending)
     for part in (intervals[i : i + _BLOCK_POINTS] for i in range(0, len(intervals), _BLOCK_POINTS)):
         deviations[part] = _deviations(arm, route, path, part, lever)
     return deviations

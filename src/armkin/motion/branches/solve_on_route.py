@@ -104,21 +104,23 @@ def _damped_steps(J: Array, residuals: Array, damping: float) -> Array:
     return np.asarray(x)
 
 
-def exact_cubics(arm: Arm, route: Route, points: Array, q: Array, rests: Int, coarser: Knots | None) -> Knots | None:
+def exact_cubics(
+    arm: Arm, route: Route, points: Array, q: Array, rests: Int, coarser_path: Knots | None
+) -> Knots | None:
     """Cubics through joint values q (N, n) that solve the route at lengths `points` (N,), with its own slopes.
 
-    rests: the points at which the path rests, which become two knots each. coarser: cubics on a subset of the points.
-    None: near a singularity the damped joints do not follow every target exactly.
+    rests: the points at which the path rests, which become two knots each. coarser_path: cubics on a subset of the
+    points. None: near a singularity the damped joints do not follow every target exactly.
     """
     point_numbers = np.sort(np.concatenate([np.arange(len(points)), rests]))
     s, values = points[point_numbers], np.asfortranarray(q[point_numbers])
-    d, pending = np.empty_like(values), np.ones(len(s), bool)
-    if coarser is not None:
-        positions = np.searchsorted(s, coarser.s)
-        positions += np.diff(coarser.s, prepend=-1.0) == 0
-        d[positions], pending[positions] = coarser.d, False
+    d, is_pending = np.empty_like(values), np.ones(len(s), bool)
+    if coarser_path is not None:
+        positions = np.searchsorted(s, coarser_path.s)
+        positions += np.diff(coarser_path.s, prepend=-1.0) == 0
+        d[positions], is_pending[positions] = coarser_path.d, False
     ends = np.append(point_numbers[1:] == point_numbers[:-1], True)  # the end takes the slope of its left side
-    rows = np.flatnonzero(pending)
+    rows = np.flatnonzero(is_pending)
     for part in (rows[i : i + _BLOCK_POINTS] for i in range(0, len(rows), _BLOCK_POINTS)):
         slopes = _slopes(arm, route, s[part], values[part], np.where(ends[part], -_SLOPE_DISTANCE, _SLOPE_DISTANCE))
         if slopes is None:
@@ -136,7 +138,7 @@ def _slopes(arm: Arm, route: Route, s: Array, q: Array, detour_slope: Array) -> 
     misses, misses_aside = (_residuals(arm, route.task, T, q, route.targets(x)) for x in (s, s_beside))
     rate = (misses_aside - misses) / (s_beside - s)
     d = _damped_steps(J, rate, (_SLOPE_DAMPING / arm.reach) ** 2)
-    unexplained = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
-    if not (unexplained <= _DAMPED_SHARE * np.abs(rate).max(axis=0)).all():
+    unexplained_rate = np.abs((J * d[:, None]).sum(axis=0) - rate).max(axis=0)
+    if not (unexplained_rate <= _DAMPED_SHARE * np.abs(rate).max(axis=0)).all():
         return None
     return np.asarray(d.T * radian_or_reach(arm))

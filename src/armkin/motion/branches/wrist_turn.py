@@ -135,11 +135,11 @@ def _widest_window(
     if turn and (allowed_numbers := [k for k in numbers if window(k).turned <= turn]):
         return allowed_numbers[-1], window(allowed_numbers[-1])
     for k in reversed(numbers) if max_offset else ():
-        detoured = _window_with_offset(arm, route, window(k))
-        if detoured is None or detoured.tip_offset > max_offset:  # a narrower window needs the same detour
+        detour_window = _window_with_offset(arm, route, window(k))
+        if detour_window is None or detour_window.tip_offset > max_offset:  # a narrower window needs the same detour
             return None
-        if _follows_detour(arm, route, detoured):
-            return k, detoured
+        if _follows_detour(arm, route, detour_window):
+            return k, detour_window
     return None
 
 

@@ -61,7 +61,7 @@ def _branch_names(columns: Columns, run: Run, offset: float) -> list[tuple[float
 
 def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[Branch]:
     """The branches at the start, sorted by how far each carries; of equal ones the chosen branch comes first."""
-    columns, ranked, first_run_branch = carried_route.columns, [], None
+    columns, last_and_branch, first_run_branch = carried_route.columns, [], None
     for chain in carried_route.chains:
         if chain.first == 0:
             last = chain.carries_to(0)
@@ -69,12 +69,12 @@ def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[
             q = joints[0].copy()  # a view would keep the whole chain
             length = float(columns.s[last]) if last >= 0 else 0.0
             end_text = reason_text(arm, _reconfiguration_at(arm, columns, chain, 0, 0.0))
-            ranked.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
+            last_and_branch.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
             if carried_route.runs and chain is carried_route.runs[0].chain:
-                first_run_branch = ranked[-1][1]
-    ranked.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not first_run_branch))
+                first_run_branch = last_and_branch[-1][1]
+    last_and_branch.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not first_run_branch))
     distinct: list[Branch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
-    for _, branch in ranked:
+    for _, branch in last_and_branch:
         q = branch.start_joints
         if not any(
             b.name == branch.name and np.abs(joint_change(arm, b.start_joints, q)).max() < _SAME_POSE for b in distinct

@@ -110,11 +110,11 @@ class Walk:
                 number += 1
             except NoSolutionError as error:
                 walk.refused = walk.refused or error
-                saved, postures, refused = walk.before_posture, walk.untried_postures, walk.refused
-                if saved is None or not postures:
-                    raise refused from None
-                walk = _copy_walk(saved)
-                walk.before_posture, walk.untried_postures, walk.refused = saved, postures, refused
+                saved_posture, postures, refusal = walk.before_posture, walk.untried_postures, walk.refused
+                if saved_posture is None or not postures:
+                    raise refusal from None
+                walk = _copy_walk(saved_posture)
+                walk.before_posture, walk.untried_postures, walk.refused = saved_posture, postures, refusal
                 number = walk.current_moves[0]
         plan, pace = walk.plan, self.pace
         plan.approach = approach_move(self.arm, start, walk.begun, pace.speed, pace.accel, pace.jerk)

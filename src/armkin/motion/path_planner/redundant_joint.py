@@ -146,11 +146,11 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, preferred: float,
         return
     values = _values_over_range(arm, joint, preferred)
     joint_angles = values * arm.ratio[joint]
-    lacking = np.zeros((1, len(values)), int)
+    lacking_counts = np.zeros((1, len(values)), int)
     for targets in routes:
-        lacking += _count_lacking(free_arm, extra, targets, joint_angles, MAX_TARGETS, [])
+        lacking_counts += _count_lacking(free_arm, extra, targets, joint_angles, MAX_TARGETS, [])
     order = np.argsort(np.abs(values - preferred), kind="stable")
-    candidates = order[lacking[0, order] == lacking.min()]
+    candidates = order[lacking_counts[0, order] == lacking_counts.min()]
     if free_arm.keep_out and not free_arm.ignores_keep_out and len(candidates) > 1:
         # a motion near a keep-out takes long to prove, so values with clearance come first
         margins = [0.0, MIN_GAP * free_arm.reach]
@@ -161,7 +161,7 @@ def _values_to_try(arm: Arm, file: PathFile, task: str | None, preferred: float,
                 free_arm, extra, targets, joint_angles[candidates], min(count, MAX_TARGETS), margins
             )
         candidates = candidates[np.lexsort((near_hits[2] > 0, near_hits[1]))]
-    yield from values[candidates[: MAX_VALUES if lacking.min() == 0 else 1]].tolist()
+    yield from values[candidates[: MAX_VALUES if lacking_counts.min() == 0 else 1]].tolist()
 
 
 def _count_lacking(
@@ -176,12 +176,12 @@ def _count_lacking(
     goals = np.repeat(sample[None], len(values), axis=0).reshape(-1, *sample.shape[1:])
     joint_angles = np.repeat(values, len(sample))
     ik_answers = ik(extra.rest, move_targets(arm, extra, goals, joint_angles), extra.task.name, examine=False)
-    legal = ik_answers.within_limits
-    conditions = [legal]
+    is_legal = ik_answers.within_limits
+    conditions = [is_legal]
     if margins:
         q = np.insert(ik_answers.q, extra.joint, joint_angles[:, None], axis=2)
-        clearances = np.full(legal.shape, -np.inf)
-        clearances[legal] = clearance(arm, q[legal]).mm
+        clearances = np.full(is_legal.shape, -np.inf)
+        clearances[is_legal] = clearance(arm, q[is_legal]).mm
         conditions += [clearances >= margin for margin in margins]
     counts = []
     for allowed in conditions:

@@ -53,11 +53,11 @@ class TrajectoryProof:
 class _SmoothedMotion:
     """A smoothed curve as the geometry of a motion, its cells as long as the grid intervals of the curve."""
 
-    def __init__(self, smoothed: Smoothed) -> None:
-        self.smoothed, self.curve = smoothed, smoothed.curve
-        self.inner = Cubics(_control_points(smoothed.curve))
-        self.step = float(np.median(np.diff(self.curve.times))) or smoothed.duration
-        self.cells = max(int(np.ceil(smoothed.duration / self.step)), 1)
+    def __init__(self, smoothed_curve: Smoothed) -> None:
+        self.smoothed, self.curve = smoothed_curve, smoothed_curve.curve
+        self.inner = Cubics(_control_points(smoothed_curve.curve))
+        self.step = float(np.median(np.diff(self.curve.times))) or smoothed_curve.duration
+        self.cells = max(int(np.ceil(smoothed_curve.duration / self.step)), 1)
 
     @cached_property
     def _sums(self) -> Array:
@@ -223,9 +223,9 @@ def _geometries(trajectory: Trajectory) -> list[tuple[int, JointMotion]]:
     """The geometry of the stretches, consecutive cubics as one; each with the number of its first stretch."""
     geometries: list[tuple[int, JointMotion]] = []
     numbered = enumerate(trajectory.stretches)
-    for smooth, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
+    for is_smoothed, group in groupby(numbered, key=lambda item: isinstance(item[1], Smoothed)):
         part = list(group)
-        if smooth:
+        if is_smoothed:
             geometries += [
                 (number, _SmoothedMotion(stretch)) for number, stretch in part if isinstance(stretch, Smoothed)
             ]
@@ -296,6 +296,6 @@ def _time_of_share(stretch: Stretch, share: float) -> float:
         return 0.0
     for _ in range(50):
         middle = (low + high) / 2
-        covered = float((stretch.evaluate(np.array([middle]))[0, joint] - stretch.start[joint]) / change[joint])
-        low, high = (middle, high) if covered < share else (low, middle)
+        covered_share = float((stretch.evaluate(np.array([middle]))[0, joint] - stretch.start[joint]) / change[joint])
+        low, high = (middle, high) if covered_share < share else (low, middle)
     return low

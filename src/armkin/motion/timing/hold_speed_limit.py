@@ -46,12 +46,12 @@ def _part_cap(arm: Arm, path: Knots, share: float) -> Array:
     lead = rate[np.arange(len(leader)), leader]
     lead = np.where(np.abs(lead) < TINY, TINY, lead)
     ratio = path.d / lead[:, None]  # q'_j / n'_m
-    slowing = -ratio * np.sign(lead)[:, None] * brakes[leader][:, None]
+    slowing_accel = -ratio * np.sign(lead)[:, None] * brakes[leader][:, None]
     max_accel = share * arm.max_accel
     for second, part in ((ends[0], slice(None, -1)), (ends[1], slice(1, None))):
         leader_bend = (second * gain[leader[part]]).sum(axis=1)
         bend = second - ratio[part] * leader_bend[:, None]
-        margin = max_accel - np.sign(bend) * slowing[part]
+        margin = max_accel - np.sign(bend) * slowing_accel[part]
         interval_cap = np.maximum(margin, 0.0) / np.maximum(np.abs(bend), TINY)
         caps[part] = np.minimum(caps[part], interval_cap.min(axis=1))
     return caps

@@ -148,10 +148,10 @@ def _largest_feasible(cap: Array, slope: Array, level: Array) -> Array:
     change = slope * cap
     lowest, highest = -(level + change).min(axis=0), (level - change).min(axis=0)
     clear = lowest < highest - 1e-9 * np.abs(highest)  # the cap itself is feasible
-    tight = (~clear).nonzero()[0]
+    tight_intervals = (~clear).nonzero()[0]
     i, j = _index_pairs(len(slope))
-    for begin in range(0, len(tight), _PAIRED_INTERVALS):
-        rows = tight[begin : begin + _PAIRED_INTERVALS]
+    for begin in range(0, len(tight_intervals), _PAIRED_INTERVALS):
+        rows = tight_intervals[begin : begin + _PAIRED_INTERVALS]
         a, b = slope.take(rows, axis=1), level.take(rows, axis=1)
         crossing = (b.take(i, axis=0) + b.take(j, axis=0)) / np.abs(a.take(i, axis=0) - a.take(j, axis=0))
         feasible[rows] = np.fmin(feasible[rows], np.fmin.reduce(crossing, axis=0, initial=np.inf))

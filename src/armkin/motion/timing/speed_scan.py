@@ -100,13 +100,15 @@ def scan(top: Array, functions: Least, previous: Array | None = None) -> Array:
     first = np.append(0, np.cumsum(np.bincount(functions.interval, minlength=len(top) - 1)))
     for _ in range(_MAX_ROUNDS):
         next_values = functions.values(y[:-1])
-        changed = (np.minimum(top[1:], np.where(next_values > 0.0, next_values, 0.0)) != y[1:]).nonzero()[0]
-        heads = changed[np.diff(changed, prepend=-2) > 1]  # a run passes the intervals right behind its head
+        changed_intervals = (np.minimum(top[1:], np.where(next_values > 0.0, next_values, 0.0)) != y[1:]).nonzero()[0]
+        heads = changed_intervals[
+            np.diff(changed_intervals, prepend=-2) > 1
+        ]  # a run passes the intervals right behind its head
         if len(heads) <= _MANY_RUNS:
             break
         _follow_runs(y, functions, first, heads, top)
     end = 0
-    for begin in changed.tolist():
+    for begin in changed_intervals.tolist():
         if begin >= end:
             end = _follow_run(y, functions, first, begin, top)
     return y

@@ -74,10 +74,10 @@ def _knots_in_sections(s: Array, q: Array, edges: Int, rests: Bool) -> Knots:
     last = np.repeat(edges[1:], sample_counts)
     parts = [slice(part.start, part.stop) for part in interval_parts(len(i))]
     slopes = np.concatenate([_slopes_at(s, q, i[part], first[part], last[part]) for part in parts])
-    smooth = begin[1:][~rests]
-    slopes[smooth - 1] = (slopes[smooth - 1] + slopes[smooth]) / 2
+    smooth_begins = begin[1:][~rests]
+    slopes[smooth_begins - 1] = (slopes[smooth_begins - 1] + slopes[smooth_begins]) / 2
     keep = np.ones(len(i), bool)
-    keep[smooth] = False
+    keep[smooth_begins] = False
     return Knots(s[i[keep]], q[i[keep]], slopes[keep])
 
 
@@ -145,17 +145,19 @@ def optimal_law(path: Knots, bounds: Bounds, rows: tuple[Array, Array] | None = 
             return np.asarray(cap)
         limits = Bound(path, np.broadcast_to(bounds.accel, path.q.shape), rows)
         law = Fastest(limits, cap)
-        excess, changed = np.ones(len(path.h)), np.arange(len(path.h))
+        excess, changed_intervals = np.ones(len(path.h)), np.arange(len(path.h))
         for count in range(_MAX_ROUNDS):
-            for part in interval_parts(len(changed)):
-                excess[changed[part]] = _lower_law(law, limits, speed, changed[part], share=count < _SHARED_ROUNDS)
+            for part in interval_parts(len(changed_intervals)):
+                excess[changed_intervals[part]] = _lower_law(
+                    law, limits, speed, changed_intervals[part], share=count < _SHARED_ROUNDS
+                )
             if excess.max() <= _EXCESS_FACTOR:
                 return law.x
             if count < _MAX_ROUNDS - 1:
-                excessive, x = np.flatnonzero(excess > _SMALL_EXCESS), law.x
-                law.lower_speeds(_add_neighbours(excessive, len(excess)))
+                excessive_intervals, x = np.flatnonzero(excess > _SMALL_EXCESS), law.x
+                law.lower_speeds(_add_neighbours(excessive_intervals, len(excess)))
                 x_changed = law.x != x
-                changed = np.flatnonzero(x_changed[1:] | x_changed[:-1] | (excess > _SMALL_EXCESS))
+                changed_intervals = np.flatnonzero(x_changed[1:] | x_changed[:-1] | (excess > _SMALL_EXCESS))
         begins = np.concatenate([[0], path.rests + 1])  # each part between two rests has its own factor
         slowdown = np.maximum(np.maximum.reduceat(excess, begins), 1.0)
         return np.asarray(law.x / np.append(np.repeat(slowdown, np.diff(np.append(begins, len(excess)))), slowdown[-1]))
@@ -170,15 +172,15 @@ def _lower_law(law: Fastest, limits: Bound, speed: Array, intervals: Int, *, sha
     if share:
         law.share[:, intervals] /= np.where(accel_shares > _SMALL_EXCESS, accel_shares, 1.0)
     excess = speed_shares if share else shares
-    excessive = np.flatnonzero(excess > _SMALL_EXCESS)
-    for points, x in ((intervals[excessive], x0[excessive]), (intervals[excessive] + 1, x1[excessive])):
-        np.fmin.at(law.cap, points, x / excess[excessive])
+    rows = np.flatnonzero(excess > _SMALL_EXCESS)
+    for points, x in ((intervals[rows], x0[rows]), (intervals[rows] + 1, x1[rows])):
+        np.fmin.at(law.cap, points, x / excess[rows])
     return np.asarray(shares)
 
 
 def _add_neighbours(intervals: Int, count: int) -> Int:
     """The given intervals (k,) and their neighbours, of `count` in all."""
-    selected = np.zeros(count + 2, bool)
+    is_selected = np.zeros(count + 2, bool)
     for k in (0, 1, 2):
-        selected[intervals + k] = True
-    return np.flatnonzero(selected[1:-1])
+        is_selected[intervals + k] = True
+    return np.flatnonzero(is_selected[1:-1])

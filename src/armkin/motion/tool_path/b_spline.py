@@ -40,9 +40,9 @@ class Layout:
         places, curves = u[knot], curve[knot]
         interval_knots = np.flatnonzero(curves[1:] == curves[:-1])  # knots at which an interval begins
         number = np.cumsum(knot) - 1
-        begun = np.searchsorted(interval_knots, number)  # intervals that begin before the point's knot
+        begun_count = np.searchsorted(interval_knots, number)  # intervals that begin before the point's knot
         # the last knot is in the last interval
-        interval = begun - (begun == np.searchsorted(interval_knots, number, side="right"))
+        interval = begun_count - (begun_count == np.searchsorted(interval_knots, number, side="right"))
         first = np.searchsorted(curves, curves[interval_knots])
         last = np.searchsorted(curves, curves[interval_knots], side="right") - 1
         neighbours = np.clip(interval_knots + np.arange(-2, 4)[:, None], first, last)

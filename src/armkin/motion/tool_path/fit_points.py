@@ -107,15 +107,16 @@ def fit_curves(y: Array, tolerance: float, stop: Bool | None = None) -> FittedCu
     stop = np.zeros(len(y), bool) if stop is None else stop
     is_used, parts = np.ones(len(y) - 1, bool), []
     for attempt in range(_MAX_TRIES + 1):
-        cubics, missed = _fit_cubics(chords, is_used, tolerance)
+        cubics, is_missed = _fit_cubics(chords, is_used, tolerance)
         # rounded chords replace cubics that miss points; in the last round they replace the whole curve
-        retried = _chords_of_curves(chords, missed)
-        final = ~retried[cubics.chord(chords)] | (attempt == _MAX_TRIES)
+        is_retried = _chords_of_curves(chords, is_missed)
+        final = ~is_retried[cubics.chord(chords)] | (attempt == _MAX_TRIES)
         parts.append(cubics.take(final))
-        if not retried.any() or attempt == _MAX_TRIES:
+        if not is_retried.any() or attempt == _MAX_TRIES:
             break
-        inner_points = np.concatenate([[False], retried[1:] & retried[:-1] & ~chords.corner[1:-1], [False]])
-        is_used, chords = retried, Chords(y, chords.corner | (missed if attempt + 1 < _MAX_TRIES else inner_points))
+        inner_points = np.concatenate([[False], is_retried[1:] & is_retried[:-1] & ~chords.corner[1:-1], [False]])
+        new_corners = is_missed if attempt + 1 < _MAX_TRIES else inner_points
+        is_used, chords = is_retried, Chords(y, chords.corner | new_corners)
     every_cubic = _Cubics(*(np.concatenate(arrays) for arrays in zip(*parts, strict=True)))
     in_order = every_cubic.take(np.argsort(every_cubic.begin, kind="stable"))
     return _round_corners(chords, stop, in_order, tolerance)
@@ -131,7 +132,7 @@ def _chords_of_curves(chords: Chords, chosen_points: Bool) -> Bool:
 def _fit_cubics(chords: Chords, is_used: Bool, tolerance: float) -> tuple[_Cubics, Bool]:
     """Fit the curves with used chords: begin, end (M,), powers (M, 4, d) of cubics; which points they miss (N,)."""
     curve, u, y = chords.curve, chords.u, chords.y
-    missed = np.zeros(len(y), bool)
+    is_missed = np.zeros(len(y), bool)
     is_line = (np.bincount(curve)[curve] == 1) & is_used  # a straight line
     line_powers = np.zeros((int(is_line.sum()), 4, y.shape[1]))
     line_powers[:, 0], line_powers[:, 1] = y[:-1][is_line], chords.step[is_line]
@@ -141,25 +142,25 @@ def _fit_cubics(chords: Chords, is_used: Bool, tolerance: float) -> tuple[_Cubic
         rows = FitRows.from_chords(chords, is_curve, tolerance)
         layout, control, misses = least_knots(rows)
         too_far = misses > 1.0
-        missed[rows.point[too_far & (rows.point >= 0)]] = True
+        is_missed[rows.point[too_far & (rows.point >= 0)]] = True
         cubics = layout.powers(control)
         for numbers in (
             rows.chord[too_far & (rows.point < 0)],
             _astray_chords(chords, is_curve, layout, cubics, tolerance),
         ):
-            missed[numbers] = missed[numbers + 1] = True
-        missed |= _astray_points(chords, is_curve, layout, cubics, tolerance)
+            is_missed[numbers] = is_missed[numbers + 1] = True
+        is_missed |= _astray_points(chords, is_curve, layout, cubics, tolerance)
         begin, end = np.append(begin, layout.begin), np.append(end, layout.end)
         powers = np.concatenate([powers, cubics])
-    missed[[0, -1]] = False
-    missed &= ~chords.corner
-    return _Cubics(begin, end, powers), missed
+    is_missed[[0, -1]] = False
+    is_missed &= ~chords.corner
+    return _Cubics(begin, end, powers), is_missed
 
 
 def _astray_points(chords: Chords, is_used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Bool:
     """Which inner points of the used curves lie farther from the cubics than the tolerance: (N,)."""
-    astray = np.concatenate([[False], is_used[1:] & is_used[:-1] & ~chords.corner[1:-1], [False]])
-    number = np.flatnonzero(astray)
+    is_astray = np.concatenate([[False], is_used[1:] & is_used[:-1] & ~chords.corner[1:-1], [False]])
+    number = np.flatnonzero(is_astray)
     y, parameters, min_square = chords.y[number], chords.u[number], np.full(len(number), np.inf)
     for _ in range(3):  # Newton steps to the nearest place
         i = np.clip(np.searchsorted(layout.begin, parameters, side="right") - 1, 0, len(cubics) - 1)
@@ -170,8 +171,8 @@ def _astray_points(chords: Chords, is_used: Bool, layout: Layout, cubics: Array,
         min_square = np.minimum(min_square, (offsets**2).sum(axis=1))
         step = (offsets * slope).sum(axis=1) / np.maximum((slope**2).sum(axis=1), 1e-300)
         parameters = parameters + np.clip(step, -1.0, 1.0)
-    astray[number[min_square <= tolerance**2]] = False
-    return astray
+    is_astray[number[min_square <= tolerance**2]] = False
+    return is_astray
 
 
 def _astray_chords(chords: Chords, is_used: Bool, layout: Layout, cubics: Array, tolerance: float) -> Int:

@@ -98,11 +98,11 @@ class Dense:
 
     def part(self, a: float, b: float) -> Dense:
         """The points and lengths of the part from length a to b [mm]."""
-        given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
+        is_given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
         return replace(
             self,
-            given=self.given[given] - a,
-            points=self.points[given],
+            given=self.given[is_given] - a,
+            points=self.points[is_given],
             bends=self.bends[bends] - a,
             spans=self.spans[(self.spans > a) & (self.spans < b)] - a,
             begins=self.begins - a,

@@ -157,7 +157,7 @@ class Window:
         reply_checks.check_next((reply.next - self._next) & 255, len(self._sent), self._line.port.name)
 
     def acknowledge(self, reply: Ack | Status, time_asked: float = 0.0) -> int:
-        """Process a reply's `next` and `free`, and count the frames that it acknowledges; requested: request time."""
+        """Process a reply's `next` and `free`, and count the frames that it acknowledges; time_asked: its request's."""
         count = (reply.next - self._next) & 255
         if count > len(self._sent):
             return 0

@@ -320,7 +320,7 @@ def _silence_error(port: Port) -> LinkError:
 def _no_board(port: Port, heard_bytes: bytes, has_damage: bool) -> LinkError:
     """The error of a port without a board that speaks this protocol.
 
-    heard: bytes received between two tries; damaged: whether damaged frames were received.
+    heard_bytes: received between two tries; has_damage: whether damaged frames were received.
     """
     port_text = f"{port.name} ({port.baud} baud)"
     if b"grbl" in heard_bytes.lower():
