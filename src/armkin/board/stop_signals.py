@@ -19,7 +19,7 @@ class Stop:
     def __call__(self) -> bool:
         return self.signal != 0
 
-    def caught(self, number: int, frame: FrameType | None) -> None:
+    def on_signal(self, number: int, frame: FrameType | None) -> None:
         """The signal handler; a second Ctrl-C does not wait for the board."""
         if (self.signal or self.at_once) and put_off(number, frame):
             return
@@ -55,7 +55,7 @@ def stoppable() -> Iterator[Stop]:
     stop = Stop()
     names = ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
     codes = (getattr(signal, name, None) for name in names)
-    old_handlers = {code: signal.signal(code, stop.caught) for code in codes if code}
+    old_handlers = {code: signal.signal(code, stop.on_signal) for code in codes if code}
     _active.append(stop)
     try:
         yield stop

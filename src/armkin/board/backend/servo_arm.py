@@ -97,7 +97,7 @@ class ServoArm(Backend):
         """Counts of the arm's motors, as last read."""
         return tuple(int(count) for count in self._counts)
 
-    def _measured(self) -> tuple[int, ...]:
+    def _measured_counts(self) -> tuple[int, ...]:
         """Counts of the arm's motors, read now."""
         self._read()
         return self.counts()
@@ -165,9 +165,9 @@ class ServoArm(Backend):
         total = elapsed = 0.0
         for queued_job in filter(None, plans if isinstance(plans, list) else ()):
             self._check_limits(queued_job)  # check all jobs before the arm moves
-        for job in from_counts(plans, self._measured, tolerance=START_DISTANCE):
+        for job in from_counts(plans, self._measured_counts, tolerance=START_DISTANCE):
             if job is None:
-                self._heed()
+                self._raise_if_stopped()
                 self.port.read(SEND_PERIOD)
                 continue
             self._check_limits(job)
@@ -239,7 +239,7 @@ class ServoArm(Backend):
                     f"servo {self.ids[k]} ({motor_names(self.arm)[k]}) stands {distance[k]} counts from its goal: is "
                     f"it blocked or overloaded?\n{self.standing_text()}"
                 )
-            self._heed()
+            self._raise_if_stopped()
 
     def _watch(self, expected: NDArray[np.int64]) -> None:
         """Hold the arm if a servo reports an error or falls far behind."""
@@ -263,7 +263,7 @@ class ServoArm(Backend):
                     f"{self.standing_text()}"
                 )
 
-    def _heed(self) -> None:
+    def _raise_if_stopped(self) -> None:
         if self._stop():
             self.hold()
             raise StoppedError

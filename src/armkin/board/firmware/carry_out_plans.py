@@ -99,7 +99,7 @@ def carry_out(
         session.reopen()
         run.begin_anew(remaining[1])
         # a bad line gets its own pause first, then four times that, and at last the longest
-        min_pause = min(max(NOISY_LEAD, 4 * min_pause), MAX_LEAD) if session.line.damaged else MAX_LEAD
+        min_pause = min(max(NOISY_LEAD, 4 * min_pause), MAX_LEAD) if session.line.has_damage else MAX_LEAD
         plans_left = chain(remaining[0], plans_left)
 
 
@@ -182,8 +182,8 @@ def _seconds_to(move: Move, count: int, clock: int) -> float:
 def _at_rest(session: Session) -> Status:
     """The status at rest of an arm whose queue ran dry; counts damage that only the board has seen."""
     status = session.wait_for_rest()
-    if status.bad and not session.line.damaged:  # damage that only the board has seen
+    if status.bad and not session.line.has_damage:  # damage that only the board has seen
         session.line.resent += 1
-    if session.line.damaged and not session.line.noisy:  # a single lost frame does not empty the queue
+    if session.line.has_damage and not session.line.noisy:  # a single lost frame does not empty the queue
         session.line.resent += 1
     return status

@@ -45,8 +45,8 @@ def stream_frames(
     """Send all frames and wait until the arm is at rest; report_left: takes the seconds of motion left."""
     has_more, at_rest = True, False  # whether the submitted motion ends at rest
     next_frame: MotionFrame | object | None = None  # first frame of the next move
-    while has_more or session.pending[0]:
-        while has_more and session.pending[0] < 2:
+    while has_more or session.backlog_and_credit[0]:
+        while has_more and session.backlog_and_credit[0] < 2:
             batch, next_frame = (next_frame or next(frames, _DONE)), None
             if isinstance(batch, MotionFrame) and at_rest and not _may_follow_rest(session, batch):
                 next_frame = batch
@@ -121,7 +121,7 @@ def lead_time(
     frames: seconds, segments and bytes on the line of the motion's first frames; unheard: [s] before the first step.
     """
     busy_pause = next((seconds for load, seconds in _LEAD_BUSY if _processor_load(session) > load), 0.0)
-    noise_pause = NOISY_LEAD if session.line.damaged else 0.0
+    noise_pause = NOISY_LEAD if session.line.has_damage else 0.0
     return max(min_pause, busy_pause, noise_pause, min(_LEAD_TIME + _lateness(session, frames, unheard), MAX_LEAD))
 
 
@@ -179,7 +179,7 @@ def motion_batches(
     """
     assert session.info is not None
     line = session.line
-    motors = sorted(move.moving, key=lambda k: axes[k])
+    motors = sorted(move.moving_motors, key=lambda k: axes[k])
     begin_counts = [int(move.start[k]) for k in motors]
     room = min(session.info.frame - 4, session.info.receive - QUESTION_BYTES - 6)
     places = [count * protocol.STEP + protocol.HALF for count in begin_counts]
@@ -189,7 +189,7 @@ def motion_batches(
     is_start = not sizes
     while segments := segments + list(islice(source, max(0, _BATCH_SEGMENTS[1] + 1 - len(segments)))):
         # a larger frame would have to wait for space
-        fits = _BATCH_SEGMENTS[1] if is_start else max(_BATCH_SEGMENTS[0], session.pending[1])
+        fits = _BATCH_SEGMENTS[1] if is_start else max(_BATCH_SEGMENTS[0], session.backlog_and_credit[1])
         fits = _BATCH_SEGMENTS[0] if line.noisy else min(fits, _BATCH_SEGMENTS[1])
         max_size = sizes.pop(0) if sizes else fits
         is_start = False
@@ -216,7 +216,7 @@ def _insert_pause(session: Session, segments: list[Segment], room: int, clock: i
     pause, sizes = _plan_start(session, segments, room, clock, min_pause)
     # Behind a rest no pause is needed, as the queue fills while the earlier motion lasts.
     follow_time = _earliest_follow(seconds_of(segments[: _fitting_count(segments, _BATCH_SEGMENTS[1], room)], clock))
-    if not session.line.damaged and min(_seconds_queued(session), follow_time) >= pause:
+    if not session.line.has_damage and min(_seconds_queued(session), follow_time) >= pause:
         return []
     if delayed_segment := delay_segment(segments[0], pause, clock):
         segments[0] = delayed_segment

@@ -41,7 +41,7 @@ class Commands:
     def _require_state(self, *states: State, config: bool = True, abort: bool = False) -> None:
         if config and not self._setup.crc:
             raise RefusedError(Error.CONFIG_NONE)
-        if abort and self._inputs.aborted():
+        if abort and self._inputs.is_aborted():
             raise RefusedError(Error.ABORT)
         if abort and self._inputs.power_cut():
             raise RefusedError(Error.POWER)
@@ -88,7 +88,7 @@ class Commands:
         self._require_state(State.IDLE)
         counts = dict(zip(axes, struct.unpack_from(f"<{len(axes)}i", payload, 4), strict=True))
         for i, count in counts.items():
-            if not self._setup.used(i) or abs(count) > 2**30:
+            if not self._setup.uses_axis(i) or abs(count) > 2**30:
                 raise RefusedError(Error.VALUE, i)
             axis = self._setup.image.axes[i]
             if self._setup.servo(i) and not axis.lower <= count <= axis.upper:
@@ -119,11 +119,11 @@ class Commands:
 
     def _check_axis_ready(self, axis: int) -> None:
         """Raise unless an axis is used, known and has its drivers or pulses on."""
-        if not self._setup.used(axis):
+        if not self._setup.uses_axis(axis):
             raise RefusedError(Error.VALUE, axis)
         if not self._axis_known(axis):
             raise RefusedError(Error.LOST, axis)
-        if not self._setup.powered(axis):
+        if not self._setup.is_powered(axis):
             raise RefusedError(Error.DISABLED, axis)
 
     def _check_rates(self, rate: Sequence[int], *, jogging: bool) -> None:
@@ -132,11 +132,11 @@ class Commands:
         is_slow = jogging and not all(self._axis_known(i) for i in moving_axes)
         for i in moving_axes:
             servo = self._setup.servo(i)
-            if not self._setup.used(i) or (servo and not jogging):
+            if not self._setup.uses_axis(i) or (servo and not jogging):
                 raise RefusedError(Error.VALUE, i)
             if servo and not self._axis_known(i):
                 raise RefusedError(Error.LOST, i)
-            if not self._setup.powered(i):
+            if not self._setup.is_powered(i):
                 raise RefusedError(Error.DISABLED, i)
             max_rate = self._setup.image.axes[i].max_rate
             max_rate = max(max_rate // 8, 1) if is_slow else max_rate

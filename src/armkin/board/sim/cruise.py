@@ -27,7 +27,7 @@ class Cruise:
         return min((axis.max_accel / abs(rate) for axis, rate in axes if rate), default=1e9)
 
     @property
-    def braking(self) -> float:
+    def braking_counts(self) -> float:
         """Counts that the fastest axis needs to stop."""
         return self.share**2 / (2 * self.slope) * max(abs(rate) for rate in self.rate)
 

@@ -11,7 +11,7 @@ class Inputs:
 
     def __init__(self, setup: Setup, switch: Callable[[int], bool] | None = None) -> None:
         self._setup = setup
-        self._switch = switch or self._released
+        self._switch = switch or self._released_level
         self.abort_level = True  # pulled up
         self.power_level = True
 
@@ -19,7 +19,7 @@ class Inputs:
         """Level of a limit input."""
         return self._switch(number)
 
-    def aborted(self) -> bool:
+    def is_aborted(self) -> bool:
         """Whether the abort input is active."""
         return bool(self._setup.crc) and self.abort_level == self._setup.image.abort_closed
 
@@ -36,7 +36,7 @@ class Inputs:
                 return n
         return None
 
-    def _released(self, number: int) -> bool:
+    def _released_level(self, number: int) -> bool:
         """Level of a released switch: low if it is normally closed."""
         guards = self._setup.image.guards
         return not (self._setup.crc and number < len(guards) and guards[number].closed)

@@ -55,10 +55,10 @@ class Setup:
         """Whether an axis is a servo."""
         return bool(self.board.servo_mask >> axis & 1)
 
-    def used(self, axis: int) -> bool:
+    def uses_axis(self, axis: int) -> bool:
         """Whether the configuration uses an axis."""
         return axis < len(self.image.axes) and self.image.axes[axis].used
 
-    def powered(self, axis: int) -> bool:
+    def is_powered(self, axis: int) -> bool:
         """Whether an axis has its drivers, or its pulses, on."""
         return self.pulses if self.servo(axis) else self.drivers

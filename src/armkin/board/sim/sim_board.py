@@ -106,7 +106,7 @@ class SimBoard:
 
     def _watch(self) -> None:
         """End the session if an input demands it."""
-        if self.inputs.aborted():
+        if self.inputs.is_aborted():
             self._end_session(Error.ABORT)
         if self.inputs.power_cut():
             self._end_session(Error.POWER)
@@ -182,7 +182,7 @@ class SimBoard:
             (Flag.SERVOS, self.setup.pulses),
             (Flag.CONFIGURED, self.setup.crc),
             (Flag.RETAINED, self.setup.retained and self.motors.axes.known),
-            (Flag.ABORT, self.inputs.aborted()),
+            (Flag.ABORT, self.inputs.is_aborted()),
             (Flag.LATCH, self.motors.homing.latched),
             (Flag.POWER_CUT, self.inputs.power_cut()),
         )

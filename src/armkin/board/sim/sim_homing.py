@@ -103,4 +103,4 @@ class Homing:
         leader = max(range(len(search.rate)), key=lambda i: abs(search.rate[i]))
         if self._cruise.travel == 0:
             self._beyond = abs(self._cruise.axes.base[leader] - self.latch[leader])
-        return self._cruise.travel + self._cruise.braking >= search.backoff + self._beyond
+        return self._cruise.travel + self._cruise.braking_counts >= search.backoff + self._beyond

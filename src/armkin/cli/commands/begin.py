@@ -106,7 +106,7 @@ class _Session:
         from armkin.robot_file import parse_robot_file
         from armkin.robot_file.scene_file import read_scene
 
-        file = parse_robot_file(self.corrected(findings), self.path)
+        file = parse_robot_file(self.corrected_text(findings), self.path)
         arm = arm_in_scene(file, None if self.scene is None else read_scene(self.scene))
         if not self.assumptions_told:
             keep_outs.mark_ignored(arm, ignore=False)
@@ -114,7 +114,7 @@ class _Session:
         self.assumptions_told = True
         return board_link.board_of(arm, rehearsal=self.port == board_link.SIM), arm
 
-    def corrected(self, findings: Findings) -> str:
+    def corrected_text(self, findings: Findings) -> str:
         """The file's text with what was found."""
         from armkin.robot_file import parse_robot_file
         from armkin.robot_file.replace_values import with_values
@@ -139,7 +139,7 @@ class _Session:
         from armkin.files import write_whole
         from armkin.robot_file import parse_robot_file
 
-        text = self.corrected(findings)
+        text = self.corrected_text(findings)
         target = out or self.path
         if text == self.text:
             output.note(f"nothing to correct in {self.path}")

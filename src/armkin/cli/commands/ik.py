@@ -114,7 +114,9 @@ def ik(
         arguments.no_numbers(target)
         rows = InputRows(batch, chosen_task.labels, f"task {chosen_task.name}", None, targets_of_pulses or [])
         engine = (1, None) if continuous else (workers, cluster)  # each row waits for the one before
-        BatchRun(questions, out, json, *engine, resume, questions.asked).run(rows).conclude(questions.unsolvable)
+        BatchRun(questions, out, json, *engine, resume, questions.request_settings).run(rows).conclude(
+            questions.unsolvable
+        )
         return
     arguments.one_alone(workers, cluster, resume)
     if targets_of_pulses is None:
@@ -198,7 +200,7 @@ class IkQuestions:
     unsolvable = True
 
     @property
-    def asked(self) -> dict[str, Any]:
+    def request_settings(self) -> dict[str, Any]:
         """What a run that goes on must ask, too."""
         request = self.request
         return {

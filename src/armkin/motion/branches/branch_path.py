@@ -71,7 +71,7 @@ class CarriedRoute:
         return len(self.runs) == 1 and self.runs[0].first == 0 and self.runs[0].last == len(self.columns.s) - 1
 
     @property
-    def covered(self) -> bool:
+    def is_covered(self) -> bool:
         """Whether the runs carry the whole route, with reconfigurations between them."""
         if not self.runs or self.runs[0].first != 0 or self.runs[-1].last != len(self.columns.s) - 1:
             return False

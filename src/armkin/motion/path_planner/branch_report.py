@@ -263,10 +263,10 @@ def path_refusal(plan: PathPlan, carried_route: CarriedRoute, branch: str | None
         text += reason_text(plan.arm, plan.reconfigurations[0])
         joints = plan.reconfigurations[0].joints
         changes = len(carried_route.runs) - 1
-        if carried_route.covered:
+        if carried_route.is_covered:
             text += f"; with {changes} change{'s' * (changes > 1)} of branch it can be done"
     plan.length += length
-    fields: dict[str, Any] = {"splittable": carried_route.covered}
+    fields: dict[str, Any] = {"splittable": carried_route.is_covered}
     if joints is not None:
         fields["joints"] = units.joints_out(plan.arm, joints).tolist()
     error = NoSolutionError(f"{text}: nothing was moved", **fields)

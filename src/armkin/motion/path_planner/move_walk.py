@@ -267,7 +267,7 @@ class Walk:
             fixed=None if any_branch else self.q, branch=branch, count=self.options.samples
         )  # fmt: skip
         branch_report.note_runs(self.plan, carried_route, near)
-        if not carried_route.in_one_run and not (self.options.split and carried_route.covered):
+        if not carried_route.in_one_run and not (self.options.split and carried_route.is_covered):
             raise branch_report.path_refusal(self.plan, carried_route, branch)
         return carried_route.columns.s, carried_route.moving_runs
 

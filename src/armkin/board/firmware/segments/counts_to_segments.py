@@ -63,7 +63,7 @@ class Move:
     brake: float = 1.0  # share of the motors' accelerations that a hold uses
 
     @property
-    def moving(self) -> list[int]:
+    def moving_motors(self) -> list[int]:
         """The motors that take part: on a line those that move, on a curve all."""
         return [motor for motor in range(len(self.start)) if self.curve or self.start[motor] != self.end[motor]]
 
@@ -105,7 +105,7 @@ class Cutter:
         that the short form is enough.
         """
         aims = [round(count * STEP) + HALF for count in counts]
-        corrections = self._owed(aims, seconds, make_up)
+        corrections = self._owed_errors(aims, seconds, make_up)
         travels = [aim - last_aim + x for aim, last_aim, x in zip(aims, self._aims, corrections, strict=True)]
         self._aims = aims
         steps = max(map(abs, travels), default=0) / STEP  # steps of the fastest motor
@@ -125,7 +125,7 @@ class Cutter:
         self.late = min(cycles - cycles_of(segment), float(segment.ticks))
         return segment
 
-    def _owed(self, aims: list[int], seconds: float, make_up: float | None) -> list[int]:
+    def _owed_errors(self, aims: list[int], seconds: float, make_up: float | None) -> list[int]:
         """The errors of earlier pieces that this one corrects, see `piece`: (motors,) [2^-23 step]."""
         errors = [last_aim - place for last_aim, place in zip(self._aims, self.places, strict=True)]
         if make_up is None:

@@ -97,7 +97,7 @@ class Window:
     @property
     def late(self) -> bool:
         """Whether an answer to what was sent should be here by now."""
-        patience = self._line.slowest + (_GAP_TIME if self._line.damaged else _ASK_DELAY)
+        patience = self._line.slowest + (_GAP_TIME if self._line.has_damage else _ASK_DELAY)
         return bool(self._sent) and self._line.port.now() - self._line.clear > patience
 
     def _room(self, size: int, first: int) -> int:

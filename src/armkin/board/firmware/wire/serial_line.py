@@ -31,14 +31,14 @@ class Line:
         return damaged_frames > max(1.0, 0.03 * self._written)
 
     @property
-    def damaged(self) -> bool:
+    def has_damage(self) -> bool:
         """Whether any frame was damaged or lost so far."""
         return self.splitter.bad + self.resent > 0
 
     @property
     def copies(self) -> int:
         """The number of copies of an important question."""
-        return _COPIES if self.damaged else 1
+        return _COPIES if self.has_damage else 1
 
     def write(self, data: bytes) -> None:
         """Send bytes."""
@@ -60,7 +60,7 @@ class Line:
                 yield reply
 
     @property
-    def unanswered(self) -> int:
+    def unanswered_count(self) -> int:
         """The number of STATUS? written since the last one that was answered."""
         return len(self._asked_at)
 

@@ -139,7 +139,7 @@ class Session:
         self._window.submit(make, segments, seconds)
 
     @property
-    def pending(self) -> tuple[int, int]:
+    def backlog_and_credit(self) -> tuple[int, int]:
         """Frames that wait to be sent, and segments that the board's queue takes beyond all that were submitted."""
         return self._window.backlog, self._window.credit
 
@@ -282,11 +282,11 @@ class Session:
 
 def _between_questions(line: Line, window: Window, ends: bool) -> float:
     """The time [s] between two status requests; ends: whether the queue ends soon."""
-    if line.unanswered > _MAX_UNANSWERED:  # more requests would fill the line and be lost
+    if line.unanswered_count > _MAX_UNANSWERED:  # more requests would fill the line and be lost
         return _POLL_PERIOD
     # One request fits beside the frames; on a bad line the last one may be lost.
-    is_late = window.late and (line.damaged or not line.unanswered)
-    normal = _NOISY_POLL_PERIOD if line.damaged else _POLL_PERIOD
+    is_late = window.late and (line.has_damage or not line.unanswered_count)
+    normal = _NOISY_POLL_PERIOD if line.has_damage else _POLL_PERIOD
     period = _QUICK_POLL_PERIOD if ends or window.out_of_credit or is_late else normal
     return period / 2 if line.noisy else period
 
