@@ -96,7 +96,7 @@ class Parts:
                 differs=differing_names,
             )
 
-    def about(self, number: int) -> dict[str, Any] | None:
+    def record_of(self, number: int) -> dict[str, Any] | None:
         """What was said of a part when it was kept; None if it is missing."""
         try:
             with open(self._place(number), "rb") as file:

@@ -64,7 +64,9 @@ def _column_values(column: Column) -> tuple[int, np.ndarray[Any, Any]]:
 @cache
 def _library() -> Any:
     """`arm_lines` of parts/table_lines.c. Raises MissingExtraError without a C compiler."""
-    powers = ",\n".join(f"    {{{_hex(high)}, {_hex(low)}}}" for high, low in map(_power, range(MIN_EXP, MAX_EXP + 1)))
+    powers = ",\n".join(
+        f"    {{{_c_number(high)}, {_c_number(low)}}}" for high, low in map(_power_of_ten, range(MIN_EXP, MAX_EXP + 1))
+    )
     text = SOURCE.read_text(encoding="utf-8").replace("@powers@", powers)
     text = text.replace("@least@", str(MIN_EXP)).replace("@count@", str(MAX_EXP - MIN_EXP + 1))
     text = text.replace("@pairs@", "".join(f"{i:02d}" for i in range(100)))
@@ -76,7 +78,7 @@ def _library() -> Any:
     return function
 
 
-def _power(exponent: int) -> tuple[int, int]:
+def _power_of_ten(exponent: int) -> tuple[int, int]:
     """10^k as 128 bits with the highest bit set, rounded up."""
     top, bottom = (10**exponent, 1) if exponent >= 0 else (1, 10**-exponent)
     shift = 128 - (top.bit_length() - bottom.bit_length())
@@ -87,5 +89,5 @@ def _power(exponent: int) -> tuple[int, int]:
     raise AssertionError(exponent)
 
 
-def _hex(value: int) -> str:
+def _c_number(value: int) -> str:
     return f"0x{value:016X}ULL"

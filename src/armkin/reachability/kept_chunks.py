@@ -46,7 +46,7 @@ def chunk_tables(
 
     def missing_chunks() -> Iterator[Chunk]:
         for chunk in chunks:
-            if parts is not None and parts.is_held and parts.about(chunk.number) is not None:
+            if parts is not None and parts.is_held and parts.record_of(chunk.number) is not None:
                 kept_numbers.append(chunk.number)
             else:
                 yield chunk

@@ -94,7 +94,7 @@ class Done(NamedTuple):
     near: list[float] | None = None  # joint values at the end, for questions that depend on the row before
     stored: bool = False  # whether the bytes are stored in a part already
 
-    def about(self) -> dict[str, Any]:
+    def record(self) -> dict[str, Any]:
         """The fields that are stored beside the bytes."""
         return {"input": self.input, "heading": self.heading, "near": self.near, **asdict(self.tally)}
 
@@ -146,7 +146,7 @@ def answer_piece(job: Job, piece: Piece) -> Done:
     )
     if job.parts is None or problem is not None:
         return finished
-    job.parts.keep(finished.number, finished.about(), finished.data)
+    job.parts.keep(finished.number, finished.record(), finished.data)
     return finished._replace(data=b"", stored=True)
 
 
@@ -294,7 +294,7 @@ class _ToFile:
         """The pieces that no earlier run has finished; those that one has are counted."""
         for piece in pieces:
             self.count = piece.number + 1
-            piece_record = self.parts.about(piece.number) if self.parts.is_held and self.batch.resume else None
+            piece_record = self.parts.record_of(piece.number) if self.parts.is_held and self.batch.resume else None
             if piece_record is None:
                 yield piece
                 continue
@@ -318,8 +318,8 @@ class _ToFile:
             if not self.parts.is_held:
                 self.parts.begin()
                 assert self.first is not None
-                self.parts.keep(0, self.first.about(), self.first.data)
-            self.parts.keep(finished.number, finished.about(), finished.data)
+                self.parts.keep(0, self.first.record(), self.first.data)
+            self.parts.keep(finished.number, finished.record(), finished.data)
         self.tally.add(finished.tally)
 
     def _write_file(self) -> None:
@@ -342,7 +342,9 @@ class _ToFile:
         """Write the heading, if the format has one, and the answers of all pieces to a file."""
         if self.parts.is_held:
             headings = (
-                piece_record["heading"] for i in range(self.count) if (piece_record := self.parts.about(i)) is not None
+                piece_record["heading"]
+                for i in range(self.count)
+                if (piece_record := self.parts.record_of(i)) is not None
             )
             heading: list[str] = next((names for names in headings if names), [])
         else:

@@ -194,24 +194,26 @@ def _ask_floor(check: Callable[[float | None], object]) -> float | None:
     """The height that the arm may not go below; a file that is wrong for other reasons is refused at once."""
     check(None)
 
-    def height(answer: str) -> float | None:
+    def floor_height(answer: str) -> float | None:
         return None if answer == "none" else number(answer, "floor")
 
-    return height(_ask("floor: z that nothing goes below [mm], or none", "none", lambda word: check(height(word))))
+    return floor_height(
+        _ask("floor: z that nothing goes below [mm], or none", "none", lambda word: check(floor_height(word)))
+    )
 
 
 def _table_by_questions(convention: str | None) -> tuple[str, list[dict[str, str]]]:
     """The table by questions on the terminal."""
 
-    def known(answer: str) -> None:
+    def check_convention(answer: str) -> None:
         if answer not in ("standard", "modified"):
             raise UsageError("write standard (Rz Tz Tx Rx) or modified (Craig: Rx Tx Rz Tz); the table's source says")
 
-    def limits(answer: str) -> None:
+    def check_limits(answer: str) -> None:
         if answer != "none":
             _row_limits(dict(zip(("lower", "upper"), answer.split(","), strict=False)), "limits")
 
-    convention = convention or _ask("convention, standard or modified", "standard", known)
+    convention = convention or _ask("convention, standard or modified", "standard", check_convention)
     count = whole_number(_ask("how many joints", "3", lambda n: whole_number(n, "joints", 1, 12)), "joints", 1, 12)
     table = []
     for i in range(1, count + 1):
@@ -221,7 +223,7 @@ def _table_by_questions(convention: str | None) -> tuple[str, list[dict[str, str
             "d": _ask(f"joint {i}: d [mm], d{i} if it slides", "0", lambda word: _table_entry(word, "d")),
             "theta": _ask(f"joint {i}: theta offset [deg]", "0", lambda word: _table_entry(word, "theta")),
         }
-        span = _ask(f"joint {i}: limits LOWER,UPPER, or none", "none", limits)
+        span = _ask(f"joint {i}: limits LOWER,UPPER, or none", "none", check_limits)
         if span != "none":
             row |= dict(zip(("lower", "upper"), span.split(","), strict=True))
         table.append(row)

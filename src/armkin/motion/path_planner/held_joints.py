@@ -72,7 +72,7 @@ def _free_values(values: ArrayLike | None, n: int, free_indices: list[int]) -> A
 def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> PathPlan:
     """A plan of the free joints with the values of all joints in its branches and runs; its motion is left out."""
 
-    def unlocked(q: Array) -> Array:
+    def with_held(q: Array) -> Array:
         return unlock(arm, held, q)
 
     singularity = plan.nearest_singularity
@@ -81,15 +81,15 @@ def _plan_of_all_joints(plan: PathPlan, arm: Arm, held: Mapping[str, float]) -> 
         arm=arm,
         held=dict(held),
         runs=[
-            replace(run, start_joints=unlocked(run.start_joints), end_joints=unlocked(run.end_joints))
+            replace(run, start_joints=with_held(run.start_joints), end_joints=with_held(run.end_joints))
             for run in plan.runs
         ],
-        branches=[replace(branch, start_joints=unlocked(branch.start_joints)) for branch in plan.branches],
+        branches=[replace(branch, start_joints=with_held(branch.start_joints)) for branch in plan.branches],
         reconfigurations=[
             replace(change, index=None if change.joint is None else arm.joint_names.index(change.joint))
             for change in plan.reconfigurations
         ],
-        nearest_singularity=None if singularity is None else (*singularity[:2], unlocked(singularity[2])),
+        nearest_singularity=None if singularity is None else (*singularity[:2], with_held(singularity[2])),
         markers=[],
         trajectory=None,
         approach=None,

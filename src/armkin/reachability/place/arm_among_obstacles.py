@@ -99,14 +99,14 @@ def _move_arm(arm: Arm, position: tuple[float, float, float], turn: float) -> Ar
 def _move_entry(entry: Entry, position: tuple[float, float, float], turn: float) -> Entry:
     """A keep-out of an arm after the arm is moved to a place."""
 
-    def placed(point: Sequence[float]) -> tuple[float, float, float]:
+    def from_place(point: Sequence[float]) -> tuple[float, float, float]:
         x, y, z = (rotation_about(2, turn) @ np.array(point) + position).tolist()
         return x, y, z
 
     if entry.floor is not None:
         return entry.model_copy(update={"floor": entry.floor + position[2]})
     if entry.capsule is not None:
-        ends = {"begin": placed(entry.capsule.begin), "end": placed(entry.capsule.end)}
+        ends = {"begin": from_place(entry.capsule.begin), "end": from_place(entry.capsule.end)}
         return entry.model_copy(update={"capsule": entry.capsule.model_copy(update=ends)})
     if entry.box is not None:
         box = entry.box
@@ -116,6 +116,6 @@ def _move_entry(entry: Entry, position: tuple[float, float, float], turn: float)
                 update={"size": tuple(high - low), "xyz": tuple(0.5 * (low + high)), "min": None, "max": None}
             )
         roll, pitch, yaw = box.rpy
-        pose = {"xyz": placed(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
+        pose = {"xyz": from_place(box.xyz), "rpy": (roll, pitch, yaw + turn / DEGREE)}
         return entry.model_copy(update={"box": box.model_copy(update=pose)})
     return entry
