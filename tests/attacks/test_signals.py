@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from armkin.cli.parsing.csv_to_numbers import Columns
+from armkin.cli.parsing.csv_to_numbers import CsvColumns
 from command_line import ROOT
 
 ARMKIN = [sys.executable, "-m", "armkin"]
@@ -44,7 +44,7 @@ def test_a_file_that_is_half_written_is_none(number: str, code: int, times: int,
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals")
 def test_signals_while_rows_are_read_are_not_lost() -> None:
     """pyarrow's reader lost one in twenty: a command that was told to end went on to its end, with exit code 0."""
-    columns = Columns(("q1", "q2", "q3"), "pose")
+    columns = CsvColumns(("q1", "q2", "q3"), "pose")
     columns.first_row_read = True
     text = b"1,2,3\n" * 16_000
     received: list[int] = []

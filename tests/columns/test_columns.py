@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from armkin.cli.batches import batch_answers
 from armkin.cli.parsing import csv_to_numbers
-from armkin.cli.parsing.csv_to_numbers import Columns
+from armkin.cli.parsing.csv_to_numbers import CsvColumns
 from armkin.columns import csv_and_json_lines, finished_chunks, ik_columns
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.table import Table, Words, take_rows
@@ -90,7 +90,7 @@ def test_machine_code_prints_the_bytes_that_python_prints(table: Table, monkeypa
 def test_a_number_is_read_as_python_reads_it(row: list[float], form: str) -> None:
     words = [form % value for value in row]
     text = (",".join(words).encode() + b"\n") * 3000
-    columns = Columns("abcd", "a test")
+    columns = CsvColumns("abcd", "a test")
     columns.first_row_read = True
     values = columns.all_plain(text)
     assert values is not None

@@ -14,7 +14,7 @@ import armkin
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.rotation import rpy
 from armkin.motion.branches import wrist_turn
-from armkin.motion.branches.branch_columns import Columns, Samples
+from armkin.motion.branches.branch_columns import BranchColumns, Samples
 from armkin.motion.path_planner.branch_report import plan_fields, wrist_pass_lines
 from armkin.plot.path_picture import plot_path
 
@@ -223,7 +223,7 @@ def test_a_whole_stretch_of_singular_postures_is_solved_at_few_samples(
     """From the Stanford arm's home: straight up joints 4 and 6 are free all along, and divided steps multiplied."""
     sample_counts, solved = [], Samples.solve_at
 
-    def count_and_call(self: Samples, s: np.ndarray, examine: bool = True) -> Columns:
+    def count_and_call(self: Samples, s: np.ndarray, examine: bool = True) -> BranchColumns:
         sample_counts.append(len(s))
         return solved(self, s, examine)
 

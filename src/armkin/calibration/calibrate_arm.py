@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.calibration import observability
-from armkin.calibration.corrected_chain import KINDS, Model, correction_model
+from armkin.calibration.corrected_chain import KINDS, CorrectedChain, correction_model
 from armkin.calibration.dropped_rows import dropped_row_numbers
 from armkin.calibration.measurement_checks import check_measurements
 from armkin.calibration.model_selection import LEVELS, MANY_ROWS, Choice, choose_level, free_indices_at
@@ -149,7 +149,7 @@ def calibrate(
     )
 
 
-def _list_corrections(model: Model, fit: Fit, rows: int) -> list[tuple[str, float, float, str]]:
+def _list_corrections(model: CorrectedChain, fit: Fit, rows: int) -> list[tuple[str, float, float, str]]:
     """Name, value, standard deviation (nan for few rows) and unit (mm, rad, 1) of each free correction."""
     deviations = observability.correction_deviations(model, fit) if len(fit.free_indices) else np.zeros(0)
     if rows < STATED_ROWS:

@@ -58,7 +58,7 @@ class _Step(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class CorrectedChain:
     """The corrected chain of one arm."""
 
     arm: Arm
@@ -140,7 +140,7 @@ class Model:
         return T
 
 
-def correction_model(arm: Arm) -> Model:
+def correction_model(arm: Arm) -> CorrectedChain:
     """The model of an arm with a correction at every place."""
     parameters: list[Parameter] = []
     steps: list[_Step] = []
@@ -174,7 +174,7 @@ def correction_model(arm: Arm) -> Model:
         steps.append(_Step(inverse(A) @ arm.link[joint + 1]))
     steps.append(_Step(arm.link[-1]))
     add_frame("tool", TOOL_PRIOR, TOOL_TURN_PRIOR)
-    return Model(arm, tuple(parameters), tuple(steps))
+    return CorrectedChain(arm, tuple(parameters), tuple(steps))
 
 
 def _link_along_normal(link: Array, reach: float) -> Array:

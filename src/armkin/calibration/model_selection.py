@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.corrected_chain import KINDS, Model, Parameter
+from armkin.calibration.corrected_chain import KINDS, CorrectedChain, Parameter
 from armkin.calibration.observability import tip_deviation
 from armkin.calibration.robust_fit import Fit, Measurements, fit_corrections, residuals
 from armkin.formula.arrays import Array
@@ -39,7 +39,7 @@ class Choice:
 
 
 def choose_level(
-    model: Model,
+    model: CorrectedChain,
     rows: Measurements,
     fixed: Collection[str] = (),
     tick: Callable[[int, int], object] | None = None,
@@ -60,7 +60,7 @@ def choose_level(
 
 
 def _cross_validate(
-    model: Model, rows: Measurements, free_sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
+    model: CorrectedChain, rows: Measurements, free_sets: list[NDArray[np.intp]], tick: Callable[[int, int], object]
 ) -> tuple[list[Fit], Array]:
     """Fits of every level to all rows, and the error of each row when it was left out: (levels, N) [mm].
 
@@ -90,7 +90,7 @@ def _cross_validate(
     return fits, errors
 
 
-def free_indices_at(model: Model, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
+def free_indices_at(model: CorrectedChain, level: int, rows: Measurements, fixed: Collection[str]) -> NDArray[np.intp]:
     """The free parameters of a level, of its own kind and those of simpler levels."""
     kinds = KINDS[: level + 1 if level else 0]  # level 1 frees the first two
 
@@ -108,7 +108,7 @@ def _five_parts(count: int) -> list[NDArray[np.intp]]:
     return [np.sort(order[k :: min(FOLDS, count)]) for k in range(min(FOLDS, count))]
 
 
-def _determines_tip(model: Model, candidate: Fit, file_errors: Array) -> bool:
+def _determines_tip(model: CorrectedChain, candidate: Fit, file_errors: Array) -> bool:
     """Whether the deviation of the tip after the fit is less than OPEN_SHARE times the error of the file."""
     return tip_deviation(model, candidate) < OPEN_SHARE * float(np.sqrt(np.mean(file_errors**2)))
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from armkin.calibration.corrected_chain import Model
+from armkin.calibration.corrected_chain import CorrectedChain
 from armkin.calibration.dropped_rows import MIN_POSITION_SCALE
 from armkin.calibration.robust_fit import Fit
 from armkin.errors import UsageError
@@ -28,12 +28,12 @@ CANDIDATE_COUNT = 400  # random postures from which the next ones to measure are
 UNLIMITED_TURN, UNLIMITED_SLIDE = np.pi, 200.0  # range [rad], [mm] to each side of an unlimited joint
 
 
-def correction_deviations(model: Model, fit: Fit) -> Array:
+def correction_deviations(model: CorrectedChain, fit: Fit) -> Array:
     """The remaining standard deviation of each free correction: (F,) [mm, rad, 1]."""
     return np.asarray(np.sqrt(np.diag(np.linalg.inv(fit.normal))) * model.prior[fit.free_indices])
 
 
-def unseen_corrections(model: Model, fit: Fit) -> list[str]:
+def unseen_corrections(model: CorrectedChain, fit: Fit) -> list[str]:
     """Texts about corrections that the rows do not determine; those with a determined sum share a text."""
     if not len(fit.free_indices):
         return []
@@ -53,7 +53,7 @@ def unseen_corrections(model: Model, fit: Fit) -> list[str]:
     return texts
 
 
-def tip_deviation(model: Model, fit: Fit) -> float:
+def tip_deviation(model: CorrectedChain, fit: Fit) -> float:
     """Standard deviation of the tip [mm] by the covariance of a fit: root mean square over 100 poses.
 
     The poses are random, within limits.
@@ -63,7 +63,9 @@ def tip_deviation(model: Model, fit: Fit) -> float:
     return float(np.sqrt(np.einsum("mip,pq,miq->m", J, np.linalg.inv(fit.normal), J, optimize=True).mean()))
 
 
-def suggest_poses(model: Model, count: int, free_indices: NDArray[np.intp], measured: Array | None = None) -> Array:
+def suggest_poses(
+    model: CorrectedChain, count: int, free_indices: NDArray[np.intp], measured: Array | None = None
+) -> Array:
     """The most informative joint values (count, n) to measure next, within limits.
 
     free_indices: the corrections to determine; measured: (M, n) poses measured already. Each next pose is the one of
@@ -102,7 +104,7 @@ def _random_poses(arm: Arm, count: int) -> Array:
     return np.random.default_rng(3).uniform(*_joint_range(arm), (count, arm.n))
 
 
-def _whitened_jacobian(model: Model, commanded: Array, free_indices: NDArray[np.intp]) -> Array:
+def _whitened_jacobian(model: CorrectedChain, commanded: Array, free_indices: NDArray[np.intp]) -> Array:
     """Displacement of the tip by the corrections, in units of the prior and of a noise of 0.1 mm: (M, 3, F)."""
     J = model.poses(np.zeros(len(model.parameters)), commanded)[1][:, :3, free_indices]
     return np.asarray(J * model.prior[free_indices] / max(0.1, MIN_POSITION_SCALE))

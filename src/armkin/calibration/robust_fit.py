@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.calibration.corrected_chain import Model
+from armkin.calibration.corrected_chain import CorrectedChain
 from armkin.calibration.dropped_rows import loss, scales, weights
 from armkin.formula.arrays import Array
 
@@ -55,7 +55,7 @@ class Residuals(NamedTuple):
     jacobian: Array  # (M, 6, P)
 
 
-def residuals(model: Model, corrections: Array, rows: Measurements) -> Residuals:
+def residuals(model: CorrectedChain, corrections: Array, rows: Measurements) -> Residuals:
     """The residuals of the model with corrections (P,)."""
     T, J = model.poses(corrections, rows.commanded)
     position_residuals = rows.position - T[:, :3, 3]
@@ -67,7 +67,7 @@ def residuals(model: Model, corrections: Array, rows: Measurements) -> Residuals
 
 
 def fit_corrections(
-    model: Model,
+    model: CorrectedChain,
     rows: Measurements,
     free_indices: NDArray[np.intp],
     start: Array | None = None,

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 
 from armkin.board.backend import StoppedError
-from armkin.board.firmware.segments.remaining_plan import Place, places_on, remaining_trajectory
+from armkin.board.firmware.segments.remaining_plan import PlanPlace, places_on, remaining_trajectory
 from armkin.board.firmware.segments.trajectory_to_counts import Cut
 from armkin.board.ports import note_path, read_note, remove_note, write_note
 from armkin.errors import HeldError, LinkError, NothingHeldError
@@ -127,7 +127,7 @@ def recall_note(machine: FirmwareMachine) -> Note:
     return note
 
 
-def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Place:
+def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> PlanPlace:
     """The arm's place on the plan, which was computed again.
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
@@ -144,7 +144,7 @@ def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> Pl
     return next(place for place in places if abs(place.elapsed - note.seconds) <= nearest + _TIME_ERROR)
 
 
-def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: Place) -> list[Cut]:
+def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: PlanPlace) -> list[Cut]:
     """The parts from a place on: the first one starts at the arm's position, the others are unchanged."""
     trajectory = remaining_trajectory(parts[place.part], place, machine.joints())
     counts = np.array(machine.counts(), dtype=np.int64)

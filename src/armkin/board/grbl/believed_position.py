@@ -29,7 +29,7 @@ Kept = dict[str, list[float] | str]
 _LASTING_OFFSETS = "G54", "G55", "G56", "G57", "G58", "G59"  # offsets that outlive a reset
 
 
-class Place:
+class BelievedPosition:
     """The arm's position on the GRBL of a session, as last read."""
 
     def __init__(self, session: Session, arm: Arm, axes: Sequence[Axis]) -> None:

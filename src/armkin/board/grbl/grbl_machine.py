@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from armkin.board.backend.sent_positions import Job
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.grbl import replies, settings, trajectory_to_gcode
-from armkin.board.grbl.believed_position import Place
+from armkin.board.grbl.believed_position import BelievedPosition
 from armkin.board.grbl.grbl_session import GrblError, Session
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.position_watch import Watch
@@ -47,7 +47,7 @@ class GrblMachine(StepperArm):
         self.axes = axes_of(arm)
         self.session = Session(port)
         self.session.open()
-        self._place = Place(self.session, arm, self.axes)
+        self._place = BelievedPosition(self.session, arm, self.axes)
         self._record = self._place.record
         self.settings, self.settings_time = self.session.settings(), port.now()  # and the time of reading them
         self._spindle = Spindle(self.session)
@@ -76,11 +76,11 @@ class GrblMachine(StepperArm):
 
     # Getting ready
 
-    def setting_differences(self) -> list[settings.Difference]:
+    def setting_differences(self) -> list[settings.SettingDifference]:
         """Settings that differ from the robot file."""
         return settings.differences(self.axes, self.settings, hal=self.session.hal)
 
-    def setup(self) -> list[settings.Difference]:
+    def setup(self) -> list[settings.SettingDifference]:
         """Write the settings that differ, read them back, and return what was written.
 
         The position is lost: its steps may mean something else now. Raises LinkError if a setting did not take.
@@ -213,7 +213,7 @@ class GrblMachine(StepperArm):
         self._place.read()
 
 
-def _serious_differences(machine: GrblMachine) -> list[settings.Difference]:
+def _serious_differences(machine: GrblMachine) -> list[settings.SettingDifference]:
     """Serious differences of the settings, read again after a reset or a while: others may have changed them.
 
     $$ has no checksum: two readings must find them.

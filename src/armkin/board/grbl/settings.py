@@ -31,7 +31,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Difference:
+class SettingDifference:
     """A setting that differs from the robot file."""
 
     number: int
@@ -74,7 +74,7 @@ def expected_settings(axes: Sequence[Axis], *, hal: bool = False) -> dict[int, t
     return expected
 
 
-def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool = False) -> list[Difference]:
+def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool = False) -> list[SettingDifference]:
     """Settings that differ from the robot file; hal: for grblHAL.
 
     A lower greatest speed or acceleration is not serious, since GRBL is then only slower than planned.
@@ -88,7 +88,7 @@ def differences(axes: Sequence[Axis], actual: Mapping[int, float], *, hal: bool 
             continue
         is_slower = number // 10 in (11, 12) and actual_value is not None and actual_value < value
         found_differences.append(
-            Difference(
+            SettingDifference(
                 number, meaning, actual_value, value, serious=not is_slower and number not in (1, *HOMING_SETTINGS)
             )
         )

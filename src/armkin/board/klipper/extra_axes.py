@@ -54,7 +54,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Difference:
+class OptionDifference:
     """An option of printer.cfg that is not as the robot file wants it."""
 
     setting: str
@@ -121,7 +121,7 @@ def settings_of(axes: Sequence[Axis]) -> dict[str, dict[str, Any]]:
     return sections
 
 
-def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Difference]:
+def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[OptionDifference]:
     """What does not fit in `configfile.settings`: section -> option -> value, as Klipper has read its file.
 
     Pins are not compared: no program can know them. Ratios of `gear_ratio` count.
@@ -131,21 +131,23 @@ def differences(axes: Sequence[Axis], actual: Mapping[str, Any]) -> list[Differe
     found_differences = []
     kinematics = printer.get("kinematics")
     if kinematics != "none":
-        found_differences.append(Difference("[printer] kinematics", _value_text(kinematics), "none"))
+        found_differences.append(OptionDifference("[printer] kinematics", _value_text(kinematics), "none"))
     for option, minimum in (("max_velocity", TIME_RATE), ("max_accel", MAX_ACCEL)):
         value = printer.get(option)
         if not isinstance(value, int | float) or value < minimum:
-            found_differences.append(Difference(f"[printer] {option}", _value_text(value), f"at least {minimum:g}"))
+            found_differences.append(
+                OptionDifference(f"[printer] {option}", _value_text(value), f"at least {minimum:g}")
+            )
     for axis in axes:
         name = f"[manual_stepper {axis.section}]"
         section = actual.get(name[1:-1])
         if not isinstance(section, Mapping):
-            found_differences.append(Difference(name, None, f"one for motor {axis.name}"))
+            found_differences.append(OptionDifference(name, None, f"one for motor {axis.name}"))
             continue
         steps = _steps_per_unit(section)
         if steps is None or not math.isclose(steps, axis.steps, rel_tol=1e-9):
             steps_text = None if steps is None else f"{steps:.9g}"
-            found_differences.append(Difference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
+            found_differences.append(OptionDifference(f"{name} steps a unit", steps_text, f"{axis.steps:.9g}"))
     return found_differences
 
 

@@ -20,7 +20,7 @@ from armkin.board.backend.sent_positions import Job, braking_time
 from armkin.board.backend.stepper_arm import StepperArm
 from armkin.board.klipper import trajectory_to_g1_lines
 from armkin.board.klipper.api import Api
-from armkin.board.klipper.extra_axes import PIECE_TIME, Axis, Difference, axes_of, differences
+from armkin.board.klipper.extra_axes import PIECE_TIME, Axis, OptionDifference, axes_of, differences
 from armkin.errors import LinkError
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ class KlipperMachine(StepperArm):
         """What `armkin status` tells besides the position."""
         return {"firmware": f"Klipper {self.version}", "state": self.state, "inputs": "", **super().report()}
 
-    def setting_differences(self) -> list[Difference]:
+    def setting_differences(self) -> list[OptionDifference]:
         """Options of printer.cfg that are not as the robot file wants them."""
         return differences(self.axes, self.settings)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from armkin import files
 from armkin.cli.parsing import csv_to_numbers
-from armkin.cli.parsing.csv_to_numbers import Columns
+from armkin.cli.parsing.csv_to_numbers import CsvColumns
 from armkin.cli.parsing.number_parsing import MAX_NUMBER
 from armkin.cli.parsing.row_chunks import Chunk
 from armkin.errors import ArmkinError, UsageError
@@ -30,7 +30,7 @@ class Piece(NamedTuple):
     source: str
     names: tuple[str, ...]
     lines: bytes = b""
-    columns: Columns | None = None
+    columns: CsvColumns | None = None
     values: Array | None = None
 
     def digest(self) -> str:
@@ -50,7 +50,7 @@ class InputRows:
         named: Mapping[str, Sequence[float]] | None = None,
         values: Sequence[Sequence[float]] = (),
     ) -> None:
-        """source: a name, or None for given values; the others: see `csv_to_numbers.Columns`."""
+        """source: a name, or None for given values; the others: see `csv_to_numbers.CsvColumns`."""
         self.source, self.names, self.purpose = source, tuple(names), purpose
         self.named, self.values = named, values
         if source is not None:
@@ -99,7 +99,7 @@ class InputRows:
 
     def _of_text(self, source: str) -> Iterator[Piece]:
         """The pieces of a CSV source, in blocks of lines; the first row with values is read for the heading."""
-        learner = Columns(self.names, self.purpose, self.named)  # reads the heading for all later pieces
+        learner = CsvColumns(self.names, self.purpose, self.named)  # reads the heading for all later pieces
         number, first = 0, 1
         with csv_to_numbers.open_source(source) as file:
             for block in csv_to_numbers.text_blocks(file, source):

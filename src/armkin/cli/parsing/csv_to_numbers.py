@@ -31,7 +31,7 @@ _WORD = re.compile(r"[A-Za-z_][A-Za-z0-9_./-]{0,63}")
 _TARGETS = "; targets are solved first: armkin ik ROBOT --batch FILE --continuous | this command with --batch -"
 
 
-class Columns:
+class CsvColumns:
     """Where each number stands in a line, learnt from the first line that is neither empty nor a comment.
 
     names: what the numbers are called; purpose: who wants them, for messages; named: values that one word stands
@@ -133,7 +133,7 @@ def batch_rows(
 ) -> Iterator[Chunk]:
     """Rows of a CSV file, or of standard input for "-", in chunks.
 
-    names, purpose, named: see `Columns`. A malformed row raises UsageError that names its number (from 1, as an
+    names, purpose, named: see `CsvColumns`. A malformed row raises UsageError that names its number (from 1, as an
     editor counts lines), after the complete rows before it were given out.
     """
     files.protect_input(0 if source == "-" else source)  # must precede the opening of an output of that name
@@ -144,7 +144,7 @@ def _all_rows(
     source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None
 ) -> Iterator[Chunk]:
     """Chunks of all rows of a CSV source; UsageError if there is no row with values."""
-    columns = Columns(names, purpose, named)
+    columns = CsvColumns(names, purpose, named)
     first, empty = 1, True
     with open_source(source) as file:
         for block in text_blocks(file, source):
@@ -163,7 +163,7 @@ def streamed_rows(
     source: str, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None = None
 ) -> Iterator[tuple[int, list[float]]]:
     """Rows of a CSV file one by one, each as soon as it can be read: its number and its values."""
-    columns = Columns(names, purpose, named)
+    columns = CsvColumns(names, purpose, named)
     with open_source(source) as file:
         for number, line in enumerate(iter(lambda: _read_line(file, source), b""), 1):
             try:
@@ -308,7 +308,7 @@ def name_of(source: str) -> str:
     return "standard input" if source == "-" else source
 
 
-def chunk_of(text: bytes, first: int, columns: Columns, source: str) -> Iterator[Chunk]:
+def chunk_of(text: bytes, first: int, columns: CsvColumns, source: str) -> Iterator[Chunk]:
     """Rows of some text, whose first line has the number `first`; a malformed one is raised behind those before it."""
     import numpy as np
 

@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
 from armkin.motion.branches.branch_chains import Chain
-from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import chord_bound, joint_change, levers, whole_turns
 from armkin.motion.branches.linked_branches import END_ACCURACY
 
@@ -30,7 +30,7 @@ _MAX_CHAINS = 64  # every boundary may multiply the chains; those through the mo
 
 
 def add_boundary_chains(
-    arm: Arm, columns: Columns, chains: list[Chain], fixed: Array | None, tolerance: float
+    arm: Arm, columns: BranchColumns, chains: list[Chain], fixed: Array | None, tolerance: float
 ) -> list[Chain]:
     """The chains and those joined from them at boundaries; fixed: (n,) the posture at the start, or None."""
     s, last = columns.s, len(columns.s) - 1
@@ -54,7 +54,7 @@ def add_boundary_chains(
     )
 
 
-def _boundary_samples(columns: Columns, chains: list[Chain]) -> list[int]:
+def _boundary_samples(columns: BranchColumns, chains: list[Chain]) -> list[int]:
     """The inner samples on a boundary near which a chain ends; an empty list if there are too many."""
     ends = np.unique([sample for chain in chains for sample in (chain.first, chain.last)])
     boundary_rows = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1

@@ -16,7 +16,7 @@ import numpy as np
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
 from armkin.model.limits import SLACK
-from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import whole_turns
 from armkin.motion.branches.linked_branches import END_ACCURACY
 from armkin.motion.plan.trajectory_proof import hit_samples as motion_hits
@@ -131,7 +131,7 @@ class Chain:
         return np.asarray(self.q[i - self.first : last - self.first + 1] + offsets)
 
 
-def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
+def chains_of_columns(arm: Arm, columns: BranchColumns) -> list[Chain]:
     """All chains of linked columns."""
     N, B = columns.q.shape[:2]
     valid = columns.valid
@@ -161,7 +161,7 @@ def chains_of_columns(arm: Arm, columns: Columns) -> list[Chain]:
     return [_assemble_chain(arm, columns, blocks) for blocks in ended_chains]
 
 
-def _assemble_chain(arm: Arm, columns: Columns, blocks: list[tuple[int, int, int]]) -> Chain:
+def _assemble_chain(arm: Arm, columns: BranchColumns, blocks: list[tuple[int, int, int]]) -> Chain:
     size = blocks[-1][1] + 1 - blocks[0][0]
     # memory order joint by joint, since limits and copies are evaluated joint by joint
     parts = [columns.q[a : b + 1, column].T for a, b, column in blocks]
@@ -243,7 +243,7 @@ class EndReason(NamedTuple):
     limit: float | None = None  # [rad | mm]
 
 
-def end_reason(columns: Columns, chain: Chain, i: int) -> EndReason:
+def end_reason(columns: BranchColumns, chain: Chain, i: int) -> EndReason:
     """Why a run from sample i ends: a hit, a limit, the path's end, the reach, a boundary or a singularity."""
     last = chain.carries_to(i)
     next_sample = min(max(last + 1, 0), len(columns.s) - 1)

@@ -29,7 +29,7 @@ _STRIDE = 8  # every 8th sample is solved first
 
 
 @dataclass
-class Columns:
+class BranchColumns:
     """Branches of samples along a route, and their links."""
 
     s: Array  # (N,) [mm]
@@ -46,14 +46,14 @@ class Columns:
         """Whether a column holds a branch: (N, B)."""
         return np.asarray(~np.isnan(self.q[:, :, 0]))
 
-    def take_rows(self, rows: Int) -> Columns:
+    def take_rows(self, rows: Int) -> BranchColumns:
         """The samples of the given rows, without their links."""
         parts = (self.s[rows], self.q[rows], self.name[rows], self.status[rows], self.within_limits[rows])
-        return Columns(*parts, self.names, self.complete)
+        return BranchColumns(*parts, self.names, self.complete)
 
-    def pad_to(self, B: int) -> Columns:
+    def pad_to(self, B: int) -> BranchColumns:
         """The samples with B columns of branches at least."""
-        return Columns(
+        return BranchColumns(
             s=self.s,
             q=_pad(self.q, B),
             name=_pad(self.name, B, -1),
@@ -64,12 +64,12 @@ class Columns:
             partner=_pad(self.partner, B, -1),
         )
 
-    def insert_rows(self, rows: Int, new: Columns) -> Columns:
+    def insert_rows(self, rows: Int, new: BranchColumns) -> BranchColumns:
         """The columns with new samples inserted before `rows`; all samples keep their links."""
         B = max(self.q.shape[1], new.q.shape[1])
         padded, new = self.pad_to(B), new.pad_to(B)
         links = new.partner if len(new.partner) else np.full((len(new.s), B), -1, np.int16)
-        return Columns(
+        return BranchColumns(
             s=np.insert(padded.s, rows, new.s),
             q=np.insert(padded.q, rows, new.q, axis=0),
             name=np.insert(padded.name, rows, new.name, axis=0),
@@ -92,7 +92,7 @@ class Samples:
     length: float
     stays: bool = False  # whether the whole route is singular, so that free joints keep their values
 
-    def solve_first(self, s: Array) -> Columns:
+    def solve_first(self, s: Array) -> BranchColumns:
         """All branches at the first samples s (N,), increasing.
 
         Singular postures are expensive to examine. A route that starts at one is solved at every 8th sample first, and
@@ -120,12 +120,12 @@ class Samples:
         columns = _concatenate(parts)
         return columns.take_rows(np.argsort(columns.s, kind="stable"))
 
-    def solve_at(self, s: Array, examine: bool = True) -> Columns:
+    def solve_at(self, s: Array, examine: bool = True) -> BranchColumns:
         """All branches at samples, without links; solved in blocks to bound the memory."""
         parts = [self._solve_block(s[k : k + _BLOCK_SAMPLES], examine) for k in range(0, len(s), _BLOCK_SAMPLES)]
         return parts[0] if len(parts) == 1 else _concatenate(parts)
 
-    def _solve_block(self, s: Array, examine: bool) -> Columns:
+    def _solve_block(self, s: Array, examine: bool) -> BranchColumns:
         """All branches at samples s (N,), on a singularity those 1e-7 of the length beside it."""
         solutions = ik(self.arm, self.targets(s), self.task, near=self.near, examine=examine)
         q, name, is_legal = solutions.q, solutions.branch.astype(np.int16), solutions.within_limits
@@ -163,11 +163,11 @@ class Samples:
         return q
 
 
-def _concatenate(parts: list[Columns]) -> Columns:
+def _concatenate(parts: list[BranchColumns]) -> BranchColumns:
     """The samples of all parts in order, padded to the same number of columns."""
     B = max(part.q.shape[1] for part in parts)
     padded = [part.pad_to(B) for part in parts]
-    return Columns(
+    return BranchColumns(
         s=np.concatenate([part.s for part in padded]),
         q=np.concatenate([part.q for part in padded]),
         name=np.concatenate([part.name for part in padded]),
@@ -178,7 +178,9 @@ def _concatenate(parts: list[Columns]) -> Columns:
     )
 
 
-def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool) -> Columns:
+def _columns_by_name(
+    solutions: Solutions, s: Array, q: Array, name: NDArray[np.int16], within_limits: Bool
+) -> BranchColumns:
     """Solutions as columns, each named branch moved to the column of its number."""
     B = q.shape[1]
     width = max(B, int(name.max(initial=-1)) + 1)
@@ -194,7 +196,7 @@ def _columns_by_name(solutions: Solutions, s: Array, q: Array, name: NDArray[np.
         q[misplaced_rows[row], number] = old_q[row, column]
         name[misplaced_rows[row], number] = number
         within_limits[misplaced_rows[row], number] = old_within[row, column]
-    return Columns(
+    return BranchColumns(
         s=s, q=q, name=name, status=status, within_limits=within_limits, names=solutions.names, complete=complete
     )
 

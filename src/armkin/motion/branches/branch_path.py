@@ -18,7 +18,7 @@ from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find_branches
 from armkin.motion.branches.boundary_chains import add_boundary_chains
 from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
-from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import END_ACCURACY, link_branches
 from armkin.motion.branches.route_grid import BranchSamples, refine_grid
@@ -61,7 +61,7 @@ class CarriedRoute:
     """A route with its branches and the runs that carry it."""
 
     route: Route
-    columns: Columns
+    columns: BranchColumns
     chains: list[Chain]
     runs: list[Run]
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.solutions import Status
-from armkin.motion.branches.branch_columns import Columns, Samples
+from armkin.motion.branches.branch_columns import BranchColumns, Samples
 from armkin.motion.branches.joint_steps import chord_bound, joint_change, largest_form, levers, whole_turns
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ _BLOCK_STEPS = 16_384  # steps certified in one call
 
 def link_branches(
     arm: Arm, targets: Callable[[Array], Array], s: Array, *, task: str | None, tolerance: float, near: Array
-) -> Columns:
+) -> BranchColumns:
     """All branches at samples s of a route, with every step certified or divided down to the shortest length.
 
     targets: lengths (N,) to targets; near: joint values for joints that are free.

@@ -19,7 +19,7 @@ from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
 from armkin.motion.branches.branch_chains import Chain
-from armkin.motion.branches.branch_columns import Columns
+from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import MIN_LEVER, joint_change
 from armkin.motion.branches.solve_on_route import correct_to_route
 from armkin.motion.branches.wrist_window import Window, add_detours
@@ -59,7 +59,7 @@ def check_wrist(arm: Arm) -> None:
 
 
 def add_wrist_chains(
-    arm: Arm, route: Route, columns: Columns, chains: list[Chain], turn: float, tip_offset: float
+    arm: Arm, route: Route, columns: BranchColumns, chains: list[Chain], turn: float, tip_offset: float
 ) -> list[Chain]:
     """The chains, and those that pass a singularity and go on with the wrist flipped.
 

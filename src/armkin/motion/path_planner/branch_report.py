@@ -17,7 +17,7 @@ from armkin.motion.plan.trajectory_proof import hit_text
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branches.branch_chains import Run
-    from armkin.motion.branches.branch_columns import Columns
+    from armkin.motion.branches.branch_columns import BranchColumns
     from armkin.motion.branches.branch_path import CarriedRoute
     from armkin.motion.timing.trajectory import Trajectory
 
@@ -49,7 +49,7 @@ def note_runs(plan: PathPlan, carried_route: CarriedRoute, near: Array) -> None:
             plan.reconfigurations.append(_reconfiguration_at(arm, columns, run.chain, run.first, offset))
 
 
-def _branch_names(columns: Columns, run: Run, offset: float) -> list[tuple[float, str]]:
+def _branch_names(columns: BranchColumns, run: Run, offset: float) -> list[tuple[float, str]]:
     """The lengths [mm] at which the branch name changes on a run, each with the new name."""
     labels = run.chain.labels[run.first - run.chain.first : run.last - run.chain.first + 1]
     changes = [0, *(1 + np.flatnonzero(np.diff(labels))).tolist()]
@@ -83,11 +83,11 @@ def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[
     return distinct
 
 
-def _branch_name(columns: Columns, label: int) -> str:
+def _branch_name(columns: BranchColumns, label: int) -> str:
     return columns.names[label] if 0 <= label < len(columns.names) else ""
 
 
-def _reconfiguration_at(arm: Arm, columns: Columns, chain: Chain, first: int, offset: float) -> Reconfiguration:
+def _reconfiguration_at(arm: Arm, columns: BranchColumns, chain: Chain, first: int, offset: float) -> Reconfiguration:
     """The place and the reason at which a run from sample `first` ends."""
     reason = end_reason(columns, chain, first)
     last_sample = max(chain.carries_to(first), 0)

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.motion.timing.cubic_knots import Knots
 
 
-class Place(NamedTuple):
+class CurvePlaces(NamedTuple):
     """Places along a path and the motion there: (T,) each."""
 
     interval: NDArray[np.intp]
@@ -66,13 +66,13 @@ class Curve:
         """Greatest speed of every joint at the grid points: (n,)."""
         return np.asarray(np.abs(self.path.d * np.sqrt(self.x)[:, None]).max(axis=0))
 
-    def locate(self, t: Array) -> Place:
+    def locate(self, t: Array) -> CurvePlaces:
         """The places along the path at times t (T,)."""
         times = np.clip(t, 0.0, self.duration)
         i = np.clip(np.searchsorted(self.times, times, side="right") - 1, 0, len(self._u) - 1)
         tau = times - self.times[i]
         v, u = np.sqrt(self.x[i]), self._u[i]
-        return Place(i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u)
+        return CurvePlaces(i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u)
 
     def lengths(self, t: Array) -> Array:
         """s at times t: (T,) -> (T,)."""

@@ -23,7 +23,7 @@ _PLAN_DISTANCE = 1.5  # largest distance [steps] of each motor from a plan that 
 
 
 @dataclass(frozen=True)
-class Place:
+class PlanPlace:
     """A place on a plan."""
 
     part: int
@@ -32,7 +32,7 @@ class Place:
     elapsed: float  # seconds since the plan began
 
 
-def remaining_trajectory(part: Cut, place: Place, present: Array) -> Trajectory:
+def remaining_trajectory(part: Cut, place: PlanPlace, present: Array) -> Trajectory:
     """The remainder of a part of a plan, from rest at joint values (n,) [rad | mm] that lie on it."""
     stretches, arm = part.trajectory.stretches, part.trajectory.arm
     first_remainder = remainder(arm, stretches[place.stretch], place.seconds, present)
@@ -41,14 +41,14 @@ def remaining_trajectory(part: Cut, place: Place, present: Array) -> Trajectory:
 
 def left_of(
     plans: Sequence[Cut], move: int, counts: Sequence[int], plan_trajectory: Callable[[Trajectory, np.ndarray], Cut]
-) -> tuple[Sequence[Cut], Place] | None:
+) -> tuple[Sequence[Cut], PlanPlace] | None:
     """The remainder of plans for an arm at rest on a move of the first one, and its place on that move.
 
     counts: the arm's position; plan_trajectory: makes a plan for its board. None: the arm is not on that move.
     """
     first, present = plans[0], np.array(counts, dtype=np.int64)
     if move == 0 and (present == first.start).all():
-        return plans, Place(0, 0, 0.0, 0.0)
+        return plans, PlanPlace(0, 0, 0.0, 0.0)
     place = next((candidate for candidate in places_on([first], present) if candidate.stretch == move), None)
     if place is None:
         return None
@@ -56,7 +56,7 @@ def left_of(
     return [plan_trajectory(remaining, present), *plans[1:]], place
 
 
-def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
+def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[PlanPlace]:
     """All places of a plan at the counts in order, one for each segment that passes them."""
     seconds_before = 0.0
     for part_number, part in enumerate(parts):
@@ -66,11 +66,11 @@ def places_on(parts: Sequence[Cut], counts: np.ndarray) -> Iterator[Place]:
             begin = seconds_before + float(part.trajectory.begins[number])
             if not segments:
                 if np.abs(move.start - counts).max(initial=0) <= _PLAN_DISTANCE:
-                    yield Place(part_number, number, 0.0, begin)
+                    yield PlanPlace(part_number, number, 0.0, begin)
                 continue
             for guess in _times_on_segments(move.start, segments, stretch.duration, counts):
                 time = _refine_time(part, number, guess, counts)
-                yield Place(part_number, number, time, begin + time)
+                yield PlanPlace(part_number, number, time, begin + time)
         seconds_before += part.duration
 
 
