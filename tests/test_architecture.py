@@ -36,13 +36,14 @@ MAY_IMPORT: dict[str, str] = {
     "inverse/singular": "keep_out formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
     " inverse/answers",
     "inverse/solvers": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination",
-    "inverse/run": "errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
+    "engines": "errors",
+    "inverse/run": "engines errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/branches"
     " inverse/answers inverse/singular inverse/solvers",
     "inverse/redundant": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed"
     " inverse/branches inverse/answers inverse/solvers",
-    "inverse": "keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed inverse/elimination"
-    " inverse/branches inverse/answers inverse/singular inverse/solvers inverse/run inverse/redundant",
-    "engines": "errors",
+    "inverse": "engines keep_out errors formula model forward inverse/tasks inverse/numeric inverse/closed"
+    " inverse/elimination inverse/branches inverse/answers inverse/singular inverse/solvers inverse/run"
+    " inverse/redundant",
     "columns": "errors files formula model forward inverse/tasks inverse/numeric inverse/branches inverse"
     " inverse/answers motors",
     "motors": "errors formula model forward",
@@ -67,7 +68,7 @@ MAY_IMPORT: dict[str, str] = {
     " inverse/closed inverse/elimination inverse/branches inverse/solvers",
     "export/js": "errors formula model forward inverse/solvers inverse/tasks inverse/closed inverse/numeric"
     " inverse/elimination inverse/branches keep_out motors export",
-    "compiled": "keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
+    "compiled": "engines keep_out keep_out/shapes errors formula model forward inverse inverse/tasks inverse/numeric"
     " inverse/branches inverse/closed inverse/answers inverse/singular inverse/solvers inverse/run export export/c"
     " columns inverse/redundant user_folders",
     "plot": "keep_out keep_out/shapes errors files formula model forward motion/plan motion/path_planner view"

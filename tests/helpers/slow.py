@@ -293,7 +293,7 @@ SLOW: dict[str, tuple[str, ...]] = {
         "test_where_an_arm_without_a_closed_form_has_no_answer_nothing_is_traced",
     ),
     "inverse/test_truth.py": (),
-    "inverse/test_workers.py": ("test_results_do_not_depend_on_the_workers",),
+    "inverse/test_threads.py": ("test_results_do_not_depend_on_the_workers",),
     "keep_out/test_fuzz_moves.py": (),
     "keep_out/test_in_c.py": (),
     "keep_out/test_motions_proved.py": ("test_random_motions_are_free_when_proved_and_hit_when_not",),

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 from numpy.typing import ArrayLike
 
 from armkin.compiled.compiled_task import CompiledTask
+from armkin.engines.threads import check_workers
 from armkin.formula.arrays import Array
 from armkin.inverse import solve
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.redundant.families import families
-from armkin.inverse.run.workers import check_workers
 from armkin.inverse.solvers.redundancy import redundancy
 from armkin.inverse.tasks.choose_task import default_task
 

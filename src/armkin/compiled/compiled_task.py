@@ -13,6 +13,7 @@ from armkin.compiled.batch_results import Results
 from armkin.compiled.elimination_rows import CompiledElimination
 from armkin.compiled.joint_functions import THREAD_POSES, JointFunctions
 from armkin.compiled.one_target import Single
+from armkin.engines.threads import share_rows
 from armkin.errors import UsageError
 from armkin.export import class_forms
 from armkin.formula import arrays
@@ -23,7 +24,6 @@ from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.numeric.tolerances import FAR_DISTANCE, SOLUTION
-from armkin.inverse.run.workers import share_rows
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import redundancy

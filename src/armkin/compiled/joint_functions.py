@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin import forward
+from armkin.engines.threads import share_rows
 from armkin.formula.arrays import Array
-from armkin.inverse.run.workers import share_rows
 from armkin.keep_out.clearance import Clearance, clearance, least_clearances, name_clearances
 
 if TYPE_CHECKING:

@@ -5,5 +5,6 @@ window of chunks is outstanding at any time, so that memory does not grow with t
 
 ordered_chunks.py  `in_order`: runs chunks and returns their results in order
 process_pool.py    processes on this machine
+threads.py         threads that share a batch
 dask_cluster.py    Dask distributed
 """

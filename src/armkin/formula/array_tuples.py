@@ -1,10 +1,10 @@
-"""Named tuples of arrays with a row for each target or candidate: selecting, stacking and replacing rows."""
+"""Arrays with a row for each target or candidate: named tuples of these, selected, stacked, replaced."""
 
 from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Columns = TypeVar("Columns")  # a named tuple of arrays
 
@@ -64,3 +64,12 @@ def widen_columns(array: NDArray[Any], width: int) -> NDArray[Any]:
     missing_value = {"f": np.nan, "b": False}.get(array.dtype.kind, -1)
     pads = [(0, 0), (0, width - array.shape[1]), *[(0, 0)] * (array.ndim - 2)]
     return np.pad(array, pads, constant_values=missing_value)
+
+
+def branch_rows(values: Sequence[ArrayLike], count: int) -> NDArray[Any]:
+    """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
+    shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
+    rows = np.empty((*shape, len(values)))
+    for k, value in enumerate(values):
+        rows[..., k] = value
+    return rows.reshape(int(np.prod(shape[:-1])), count, len(values)).swapaxes(0, 1).copy()

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from armkin.engines.threads import check_workers, share_rows
 from armkin.formula import arrays
 from armkin.formula.array_tuples import replace_rows, rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
@@ -31,7 +32,6 @@ from armkin.inverse.redundant.position_first import position_first as minima
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examine_targets
-from armkin.inverse.run.workers import check_workers, share_rows
 from armkin.inverse.singular import legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import redundancy

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import NoSolutionError, UsageError
+from armkin.formula.arrays import Array
 from armkin.model.units import DEGREE, finite_or_none, limits_out
 
 if TYPE_CHECKING:
@@ -28,6 +29,13 @@ def outside_limits(arm: Arm, q: ArrayLike) -> NDArray[np.bool_]:
     """
     values = np.asarray(q, dtype=float)
     return (values < arm.lower - SLACK) | (values > arm.upper + SLACK)
+
+
+def principal_values(value: Array) -> Array:
+    """Values [rad] in [-pi, pi], with half a turn as +pi."""
+    if value.min(initial=0.0) >= SLACK - np.pi:
+        return value
+    return np.where(value < SLACK - np.pi, value + 2.0 * np.pi, value)
 
 
 def limit_fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:

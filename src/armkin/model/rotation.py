@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike
 from armkin.formula.arrays import Array
 
 BLOCK_ROWS = 2_048  # rows computed together, so that their arrays fit the cache
+SMALL_TURN = 1e-8  # largest difference of a small rotation's trace from 3
+HALF_TURN = 1e-6  # a rotation by nearly half a turn has a smaller sine
+LEAST_DIVISOR = 1e-300  # keeps quotients finite
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # half a turn about x, which reverses a joint's axis by conjugation
 
 
@@ -153,3 +156,20 @@ def cos_sin_deg(angle: float) -> tuple[float, float]:
     if remainder == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(quarter) % 4]
     return math.cos(math.radians(angle)), math.sin(math.radians(angle))
+
+
+def rotation_vectors_of_sines(w: Array, trace: Array, C: Array) -> Array:
+    """Rotation vectors (M, 3) of matrices C' (M, 9), accurate also near half a turn.
+
+    w: (M, 3) axes as long as the sines, which this changes; trace: (M,) of the matrices.
+    """
+    s = np.sqrt((w * w).sum(axis=1))
+    angle = np.arctan2(s, 0.5 * (trace - 1.0))
+    near_half = (s < HALF_TURN) & (trace < 0.0)
+    if near_half.any():
+        B = C[near_half].reshape(-1, 3, 3) + np.eye(3)
+        k = np.argmax(np.einsum("mji,mji->mj", B, B), axis=1)
+        axis = B[np.arange(len(B)), k]
+        w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), LEAST_DIVISOR)
+        s[near_half] = 1.0
+    return np.asarray(w * np.where(trace < 3.0 - SMALL_TURN, angle / np.maximum(s, LEAST_DIVISOR), 1.0)[:, None])

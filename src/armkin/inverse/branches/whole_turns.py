@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Bool, Truth, wrap_angle
 from armkin.forward import one_pose
 from armkin.inverse.numeric import tolerances as tol
 from armkin.model.arm import Arm, actual_arm
-from armkin.model.limits import SLACK
+from armkin.model.limits import SLACK, principal_values
 from armkin.model.units import TURN
 
 HALF_TURN = np.pi + SLACK  # largest distance [rad] of a copy above `near`
@@ -34,7 +34,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         return value, (value >= lower - SLACK) & (value <= upper + SLACK)
     if lower >= -np.pi and upper <= np.pi:
         # only the principal value can be legal, or one of the two for half a turn
-        value, low, high = _principal_values(value), lower - SLACK, upper + SLACK
+        value, low, high = principal_values(value), lower - SLACK, upper + SLACK
         if low <= -np.pi or high >= np.pi:
             value = _half_turned(value, near, low, high)
         if low <= -np.pi and high >= np.pi:
@@ -43,7 +43,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
     at_zero = isinstance(near, float) and near == 0.0
     original = value
     if at_zero:
-        value = _principal_values(value)
+        value = principal_values(value)
     else:
         copy = np.asarray((near + HALF_TURN) - value)  # one array for all steps, which stays in the cache
         copy /= TURN
@@ -68,15 +68,8 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
         value, above = np.where(fits, shifted, value), above & ~fits
     outside = below | above
     if not at_zero and outside.any():
-        value = np.where(outside, _principal_values(original), value)
+        value = np.where(outside, principal_values(original), value)
     return value, ~outside
-
-
-def _principal_values(value: Array) -> Array:
-    """Values in [-pi, pi], with half a turn as +pi."""
-    if value.min(initial=0.0) >= SLACK - np.pi:
-        return value
-    return np.where(value < SLACK - np.pi, value + TURN, value)
 
 
 def _half_turned(value: Array, near: Array | float, low: float, high: float) -> Array:

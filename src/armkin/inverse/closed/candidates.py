@@ -1,13 +1,11 @@
 """Candidates of a closed form with their residuals, from code recorded once."""
 
-import math
-from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from armkin.formula import arrays, pose
+from armkin.formula.array_tuples import branch_rows
 from armkin.formula.arrays import Array, Bool, Entry, Int
 from armkin.formula.trace import StraightLineCode
 from armkin.forward import fk
@@ -94,7 +92,7 @@ class Recorded:
         for v, slides in zip(np.ascontiguousarray(values.T), self.arm.prismatic, strict=True):
             flat += [v] if slides else [np.cos(v), np.sin(v)]
         columns = list(self._preferring.run(flat, self._preferring.workspace(len(target))))
-        return as_rows(columns[: self.arm.n + 1], len(target))
+        return branch_rows(columns[: self.arm.n + 1], len(target))
 
     def in_numbers(self, target: Array) -> list[Array]:
         """`candidates` in numbers that do not depend on the other targets, to the last digit."""
@@ -107,7 +105,7 @@ class Recorded:
         """Candidates of targets as rows: values (N, B, n), real or not, their squared residual (N, B), doubt (N,)."""
         N = len(target)
         columns = list(self.code.run(target_entries(self.task, target), self.code.workspace(N)))
-        *_, miss, edge, _ = rows = np.moveaxis(as_rows(columns, N), 2, 0)
+        *_, miss, edge, _ = rows = np.moveaxis(branch_rows(columns, N), 2, 0)
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
     def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
@@ -203,15 +201,6 @@ def is_sound(arm: Arm, task: Task, geometry: Geometry) -> bool:
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (16, arm.n)) * np.where(arm.prismatic, arm.reach / 8, 1.0)
     _, miss, _ = recorded_formula(arm, task, geometry).rows(fk(arm, q))
     return int((miss.min(axis=1) <= tol.ACCEPTED**2).sum()) >= 15
-
-
-def as_rows(values: Sequence[ArrayLike], count: int) -> Array:
-    """Entries on branch axes (b0, b1, b2, N) as rows (N, B, entries)."""
-    shape = np.broadcast_shapes((1, 1, 1, count), *(np.shape(v) for v in values))
-    rows = np.empty((*shape, len(values)))
-    for k, value in enumerate(values):
-        rows[..., k] = value
-    return rows.reshape(math.prod(shape[:-1]), count, len(values)).swapaxes(0, 1).copy()
 
 
 @lru_cache(maxsize=256)

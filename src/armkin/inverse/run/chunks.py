@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.engines.threads import share_rows
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int
@@ -20,7 +21,6 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.run.edges import AT_ONCE, decide_edges
 from armkin.inverse.run.folds import Doubted, decide_folds
-from armkin.inverse.run.workers import share_rows
 from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses
 from armkin.model.arm import Arm
@@ -53,7 +53,10 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
         on_edge: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal, rounding[chunk], entries = _read_chunk(task, raw[chunk])
+            goal: Array = raw[chunk]
+            entries: Sequence[Any] = target_entries(task, goal) if task.orientation != "full" else ()
+            if task.orientation == "full":
+                goal, rounding[chunk], entries = read_poses(goal)
             target[chunk] = goal
             if len(goal) == 1:
                 outputs = runner.in_numbers(goal)
@@ -67,8 +70,7 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
                 at_tip = near_itself.at_tip(arm, task, goal, tips, x)
             part = Goals(arm, task, goal, near[chunk])
             doubted = _write_chunk(part, (*runner.axes, len(goal)), rows_of(batch, chunk), outputs, close, at_tip)
-            if len(doubted.rows):
-                on_edge.append(doubted._replace(rows=start + doubted.rows))
+            on_edge.append(doubted._replace(rows=start + doubted.rows))
         return on_edge
 
     doubted = [chunk for part in share_rows(solve_rows, N, workers, step, step) for chunk in part]
@@ -76,14 +78,9 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
     unsolved = np.empty(0, np.intp)
     if geometry.doubts is not None:
         unsolved = np.concatenate([unsolved, *(chunk.rows for chunk in doubted)])
-    elif examine and doubted:
+    elif examine and doubted:  # of no targets there are no chunks
         batch = _decide_doubted(goals._replace(target=target), runner, batch, stack_rows(doubted))
     return Solved(batch, math.prod(runner.axes), target, rounding, unsolved)
-
-
-def _read_chunk(task: Task, raw: Array) -> tuple[Array, Array | float, Sequence[Any]]:
-    """Targets as they are solved, the defects of their rotations, and their entries as arrays."""
-    return read_poses(raw) if task.orientation == "full" else (raw, 0.0, target_entries(task, raw))
 
 
 def _decide_doubted(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted) -> Batch:
@@ -109,7 +106,10 @@ def _write_chunk(
     on_edge = _on_edge(doubt, miss.reshape(valid.shape), some_invalid)
     if len(at_tip):
         on_edge = np.union1d(on_edge, near_itself.put_near(goals, part, at_tip))
-    doubted = _collect_doubts(part, shape, outputs[-3:], on_edge, at_tip)
+    at_edge = (np.broadcast_to(x, shape)[..., on_edge].reshape(len(valid), -1).T for x in outputs[-3:])
+    miss_at_edge, doubt, is_free = at_edge if len(on_edge) else np.empty((3, 0, len(valid)))
+    plain: Bool = np.asarray(~(is_free > 0.0).any(axis=1) & np.isin(on_edge, at_tip, invert=True))
+    doubted = Doubted(on_edge, part.q[on_edge], miss_at_edge, doubt > 0.0, plain)
     if some_invalid is not None:
         count = valid.view(np.int8).sum(axis=0, dtype=np.int8)
         part.status[count == 0] = Status.UNREACHABLE
@@ -133,15 +133,6 @@ def _write_branches(arm: Arm, part: Batch, shape: tuple[int, ...], values: list[
     part.valid[...] = valid.T
     part.within[...] = part.valid if within is valid else within.T
     part.branch[...] = _every_branch(len(valid), arrays.CHUNK)[:N]
-
-
-def _collect_doubts(part: Batch, shape: tuple[int, ...], outputs: list[Any], on_edge: Int, at_tip: Int) -> Doubted:
-    """Targets on an edge and their candidates: what these miss, squared, their doubts and whether a joint is free."""
-    B = part.q.shape[1]
-    at_edge = (np.broadcast_to(x, shape)[..., on_edge].reshape(B, -1).T for x in outputs)
-    miss, doubt, is_free = at_edge if len(on_edge) else np.empty((3, 0, B))
-    plain: Bool = np.asarray(~(is_free > 0.0).any(axis=1) & np.isin(on_edge, at_tip, invert=True))
-    return Doubted(on_edge, part.q[on_edge], miss, doubt > 0.0, plain)
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:

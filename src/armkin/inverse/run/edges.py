@@ -4,11 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of, stack_rows
+from armkin.formula.array_tuples import branch_rows, rows_of, stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
 from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, write_branches
-from armkin.inverse.closed.candidates import Recorded, as_rows
+from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular import components, linkages, near_itself, surfaces
 
@@ -113,7 +113,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     """The targets `rows` with values for free joints; candidates on no edge that miss their target are nan."""
     arm, task, target, near = goals.of(rows)
     # the last digit may decide about singularity, so use plain numbers, which do not depend on the batch
-    outputs = as_rows(runner.in_numbers(target), len(rows))
+    outputs = branch_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
     is_plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
     is_plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False

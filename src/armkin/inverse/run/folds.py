@@ -9,11 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from armkin.formula.array_tuples import branch_rows
 from armkin.formula.arrays import Array, Bool, Int
 from armkin.forward import tip_and_jacobian
 from armkin.inverse.answers.batch import Batch, Goals, write_branches
 from armkin.inverse.answers.solutions import Status
-from armkin.inverse.closed.candidates import Recorded, as_rows
+from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.tasks.residuals import task_jacobian
@@ -56,7 +57,7 @@ def decide_folds(goals: Goals, runner: Recorded, batch: Batch, doubted: Doubted)
     if len(listed):
         rows, pairs, solving = doubted.rows[listed], pairs[listed], solving[listed] & ~is_second[listed]
         if pairs.any():
-            doubted.q[listed[pairs]] = as_rows(runner.in_numbers(target[rows[pairs]]), pairs.sum())[:, :, : arm.n]
+            doubted.q[listed[pairs]] = branch_rows(runner.in_numbers(target[rows[pairs]]), pairs.sum())[:, :, : arm.n]
         order = np.argsort(~solving, axis=1, kind="stable")
         valid = np.take_along_axis(solving, order, axis=1)
         q = np.where(valid[:, :, None], np.take_along_axis(doubted.q[listed], order[:, :, None], axis=1), np.nan)

@@ -46,12 +46,17 @@ def decide_self_motions(goals: Goals, q: Array, loose: Bool) -> Linkages:
     """
     arm, task, target, near = goals
     K, S, B, n = q.shape
-    solving, near_miss = _solving(goals, q, loose), newton.misses(arm, task, near, target)
+    solving, near_miss = ~np.isnan(q[..., 0]) & loose[:, None], newton.misses(arm, task, near, target)
+    tried = np.repeat(target, solving.sum(axis=(1, 2)), axis=0)
+    solving[solving] = newton.misses(arm, task, q[solving], tried) < tol.ROUNDING_RESIDUAL
     decided, motions = _find_motions(goals, q, solving, loose)
     leader, is_apart = _first_columns(arm, motions, loose)
     lacking = np.asarray((loose & (solving.sum(axis=1) < 2)).any(axis=1))
     decided &= is_apart & ~lacking & ~((near_miss > tol.ROUNDING_RESIDUAL) & (near_miss <= tol.SOLUTION))
-    circuit = _circuits(arm, q, solving & decided[:, None, None], motions)
+    circuit = np.zeros(solving.shape, bool)
+    k, s, b = np.nonzero(solving & (decided[:, None] & (motions.joint >= 0))[:, None])
+    if len(k):
+        circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
     solving[:, 1:] &= ~motions.line[:, None]  # a line's posture at the first value is the nearest
     key = np.where(solving, 2 * leader[:, None] + circuit, 2 * B).reshape(K, -1)
     # a self-motion of two circuits may have candidates on one of them alone
@@ -59,7 +64,11 @@ def decide_self_motions(goals: Goals, q: Array, loose: Bool) -> Linkages:
     lacks_circuit = decided & ((motions.joint >= 0) & (on_circuit.sum(axis=2) == 1)).any(axis=1)
     decided &= ~lacks_circuit
     postures = q.reshape(K, -1, n).copy()
-    listed = _nearest_of_keys(arm, postures, near, key) & (key < 2 * B)
+    # of candidates with one key that of the least motion is listed
+    order = np.lexsort((np.abs(newton.difference(arm, postures, near[:, None])).sum(axis=2), key))
+    leads, listed = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0, np.zeros(key.shape, bool)
+    np.put_along_axis(listed, order, leads, axis=1)
+    listed &= key < 2 * B
     if (stands := decided & (near_miss <= tol.ROUNDING_RESIDUAL)).any():
         decided &= _list_near(goals, postures, listed, key, motions, leader, loose, stands)
     decided &= _one_direction(goals, postures, listed & decided[:, None], key)
@@ -67,32 +76,6 @@ def decide_self_motions(goals: Goals, q: Array, loose: Bool) -> Linkages:
     postures[~listed] = np.nan
     joints = listed[:, :, None] & np.tile(motions.d != 0.0, (1, S, 1))
     return Linkages(decided, lacking | lacks_circuit, postures, joints)
-
-
-def _solving(goals: Goals, q: Array, loose: Bool) -> Bool:
-    """Which loose candidates (K, S, B, n) solve their targets: (K, S, B)."""
-    tried = ~np.isnan(q[..., 0]) & loose[:, None]
-    target = np.repeat(goals.target, tried.sum(axis=(1, 2)), axis=0)
-    tried[tried] = newton.misses(goals.arm, goals.task, q[tried], target) < tol.ROUNDING_RESIDUAL
-    return tried
-
-
-def _circuits(arm: Arm, q: Array, solving: Bool, motions: _Motions) -> Bool:
-    """On which of two circuits of four bars candidates (K, S, B, n) that are solving are."""
-    circuit = np.zeros(solving.shape, bool)
-    k, s, b = np.nonzero(solving & (motions.joint >= 0)[:, None])
-    if len(k):
-        circuit[k, s, b] = four_bars.sides(arm, q[k, s, b], motions.d[k, b] != 0.0, motions.joint[k, b])
-    return circuit
-
-
-def _nearest_of_keys(arm: Arm, postures: Array, near: Array, key: Int) -> Bool:
-    """Which of the postures (K, M, n) with the same key (K, M) has the least motion from near (K, n): (K, M)."""
-    order = np.lexsort((np.abs(newton.difference(arm, postures, near[:, None])).sum(axis=2), key))
-    nearest = np.zeros(key.shape, bool)
-    leads = np.diff(np.take_along_axis(key, order, axis=1), axis=1, prepend=-1) != 0
-    np.put_along_axis(nearest, order, leads, axis=1)
-    return nearest
 
 
 def _find_motions(goals: Goals, q: Array, solving: Bool, loose: Bool) -> tuple[Bool, _Motions]:

@@ -4,9 +4,8 @@ import numpy as np
 
 from armkin.formula.arrays import Array, wrap_angle
 from armkin.inverse.tasks.task import NO_DIRECTION, Task
+from armkin.model.rotation import SMALL_TURN, rotation_vectors_of_sines
 
-SMALL_TURN = 1e-8  # largest difference of a small rotation's trace from 3
-HALF_TURN = 1e-6  # a rotation by nearly half a turn has a smaller sine
 ABOVE, BELOW = np.array([5, 6, 1]), np.array([7, 2, 3])  # where rotations (3, 3) have the sines of their axes
 TINY = 1e-300  # floor of divisors, which keeps quotients finite
 
@@ -25,7 +24,7 @@ def residual(task: Task, T: Array, q: Array, target: Array, unit: float = 1.0) -
         difference[:, 3:] = 0.5 * (C.take(ABOVE, axis=1) - C.take(BELOW, axis=1))
         trace = C[:, 0] + C[:, 4] + C[:, 8]
         if (trace < 3.0 - SMALL_TURN).any():
-            difference[:, 3:] = _rotation_vectors(difference[:, 3:], trace, C)
+            difference[:, 3:] = rotation_vectors_of_sines(difference[:, 3:], trace, C)
         return difference
     parts = [(target[:, : task.position] - T[:, : task.position, 3]) / unit]
     if len(task.sums):
@@ -59,17 +58,3 @@ def task_jacobian(task: Task, J: Array, T: Array) -> Array:
         z = T[:, :3, 2]
         parts.append(J[:, 3:] - z[:, :, None] * np.einsum("mi,min->mn", z, J[:, 3:])[:, None])
     return np.concatenate(parts, axis=1)
-
-
-def _rotation_vectors(w: Array, trace: Array, C: Array) -> Array:
-    """Rotation vectors of matrices C' (M, 9), accurate also near half a turn; w: (M, 3) axes as long as the sines."""
-    s = np.sqrt((w * w).sum(axis=1))
-    angle = np.arctan2(s, 0.5 * (trace - 1.0))
-    near_half = (s < HALF_TURN) & (trace < 0.0)
-    if near_half.any():
-        B = C[near_half].reshape(-1, 3, 3) + np.eye(3)
-        k = np.argmax(np.einsum("mji,mji->mj", B, B), axis=1)
-        axis = B[np.arange(len(B)), k]
-        w[near_half] = axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), TINY)
-        s[near_half] = 1.0
-    return np.asarray(w * np.where(trace < 3.0 - SMALL_TURN, angle / np.maximum(s, TINY), 1.0)[:, None])

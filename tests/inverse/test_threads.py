@@ -9,9 +9,9 @@ import pytest
 from shipped_arms import shipped_arm
 
 import armkin
+from armkin.engines.threads import share_rows
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.inverse.run.workers import share_rows
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import targets_of
 
