@@ -177,8 +177,8 @@ def test_csv_of_targets_is_dense_unless_it_has_blends(three_dof: Arm, tmp_path: 
 def test_a_blend_that_does_not_fit_is_made_smaller(three_dof: Arm) -> None:
     moves = [{"point": [390, 80, 300]}, {"line": [390, 81.5, 300]}, {"line": [370, 81.5, 300]}]
     plan = armkin.path(three_dof, {"moves": moves, "blend": 5})
-    assert (plan.reduced.count, plan.reduced.wished) == (1, 5.0)
-    assert plan.reduced.became == pytest.approx(0.75)
+    assert (plan.reduced.count, plan.reduced.wished_radius) == (1, 5.0)
+    assert plan.reduced.reduced_radius == pytest.approx(0.75)
     assert len(plan.on_path) == 1
 
 

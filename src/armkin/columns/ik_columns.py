@@ -33,7 +33,7 @@ class BranchTable(NamedTuple):
     """Columns of the branches of some targets, and which targets have no best branch (N,)."""
 
     table: Table
-    unsolved: Bool
+    is_unsolved: Bool
 
 
 def branch_columns(
@@ -64,7 +64,9 @@ def branch_columns(
         block = slice(i, i + BLOCK_TARGETS)
         answers = _Answers(solutions, block, q, within_limits, is_free, near, names)
         parts.append(_list_branches(request, answers, rows, all_branches, nearest_in_c))
-    return BranchTable(join_tables([part.table for part in parts]), np.concatenate([part.unsolved for part in parts]))
+    return BranchTable(
+        join_tables([part.table for part in parts]), np.concatenate([part.is_unsolved for part in parts])
+    )
 
 
 class _Answers(NamedTuple):

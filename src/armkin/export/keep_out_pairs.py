@@ -29,7 +29,7 @@ def pair_tables(arm: Arm) -> Tables:
     """The tables of an arm with keep-outs: pairs of obstacles and moving bodies, then pairs of bodies."""
     arm_guard = guard(arm)
     arm_bodies = arm_guard.bodies
-    solid = sorted({int(arm_bodies.owner[k]) for k in arm_guard.moving})
+    solid = sorted({int(arm_bodies.owner[k]) for k in arm_guard.moving_segments})
     shapes = []
     for _, obstacle in arm_guard.obstacles:
         kind, values = obstacle.c_function()
@@ -39,7 +39,7 @@ def pair_tables(arm: Arm) -> Tables:
     return Tables(
         thick=arm_bodies.radius[arm_bodies.owner].tolist(),
         solid=len(solid),
-        moving=[(int(k), solid.index(int(arm_bodies.owner[k]))) for k in arm_guard.moving],
+        moving=[(int(k), solid.index(int(arm_bodies.owner[k]))) for k in arm_guard.moving_segments],
         shapes=shapes,
         crossings=list(zip(arm_guard.ours.tolist(), arm_guard.theirs.tolist(), pair_of_crossing.tolist(), strict=True)),
         pairs=[arm_guard.pair_names(k) for k in range(len(arm_guard.pairs))],

@@ -42,7 +42,7 @@ class Guard:
     obstacles: tuple[tuple[str, Shape], ...]
     pairs: tuple[Pair, ...]
     left_out: tuple[tuple[str, str], ...]
-    moving: NDArray[np.intp]  # segments that may hit obstacles, sorted by body
+    moving_segments: NDArray[np.intp]  # segments that may hit obstacles, sorted by body
     first: NDArray[np.intp]  # index in `moving` of the first segment of each body
     ours: NDArray[np.intp]  # (M,) segments of the later body, sorted by pair of bodies
     theirs: NDArray[np.intp]  # (M,) segments of the earlier body
@@ -60,9 +60,9 @@ class Guard:
         a, b = segment_ends(self.arm, q)
         radius, owner = self.bodies.radius, self.bodies.owner
         parts = []
-        if len(self.moving):
-            begin, end = a[:, self.moving], b[:, self.moving]
-            body_radius = radius[owner[self.moving]][:, None]
+        if len(self.moving_segments):
+            begin, end = a[:, self.moving_segments], b[:, self.moving_segments]
+            body_radius = radius[owner[self.moving_segments]][:, None]
             parts = [
                 np.minimum.reduceat(shape.distance(begin, end) - body_radius, self.first) for _, shape in self.obstacles
             ]
@@ -112,9 +112,9 @@ class Guard:
         half_length = np.sqrt(np.einsum("ksn,ksn->sn", direction, direction)) / 2
         radius = self._segment_radius[:, None]
         i, j = self.ours, self.theirs
-        moving_middles, moving_radius = middle[:, self.moving], radius[self.moving]
+        moving_middles, moving_radius = middle[:, self.moving_segments], radius[self.moving_segments]
         distances = [shape.of_points(moving_middles) - moving_radius for _, shape in self.obstacles]
-        half_lengths = [half_length[self.moving]] * len(distances)
+        half_lengths = [half_length[self.moving_segments]] * len(distances)
         if len(i):
             offset = middle[:, i] - middle[:, j]
             distances.append(np.sqrt(np.einsum("ksn,ksn->sn", offset, offset)) - radius[i] - radius[j])
@@ -125,7 +125,7 @@ class Guard:
         """Exact distances (M,) for rows of item k of `_middle_distances` in some poses."""
         radius = self._segment_radius
         if k < len(self.obstacles):
-            segment = self.moving[rows]
+            segment = self.moving_segments[rows]
             return self.obstacles[k][1].distance(a[:, segment, poses], b[:, segment, poses]) - radius[segment]
         i, j = self.ours[rows], self.theirs[rows]
         axis_distance = segment_distance(a[:, i, poses], b[:, i, poses], a[:, j, poses], b[:, j, poses])
@@ -139,7 +139,7 @@ class Guard:
     @cached_property
     def _pair_of_row(self) -> NDArray[np.intp]:
         """The index of the pair for each row: segments and obstacles, then two segments of different bodies."""
-        body = np.searchsorted(self.first, np.arange(len(self.moving)), side="right") - 1
+        body = np.searchsorted(self.first, np.arange(len(self.moving_segments)), side="right") - 1
         of_obstacles = [body + k * len(self.first) for k in range(len(self.obstacles))]
         segment_pair = np.searchsorted(self.starts, np.arange(len(self.ours)), side="right") - 1
         return np.concatenate([*of_obstacles, segment_pair + len(self.obstacles) * len(self.first)]).astype(np.intp)
@@ -187,7 +187,7 @@ def _guard_of_pairs(
         obstacles=obstacles,
         pairs=tuple(named_pairs),
         left_out=left_out,
-        moving=moving_segments,
+        moving_segments=moving_segments,
         first=np.flatnonzero(np.diff(arm_bodies.owner[moving_segments], prepend=-1)),
         ours=rows[:, 0],
         theirs=rows[:, 1],

@@ -77,8 +77,8 @@ def extent(arm: Arm, seed: int = 0, samples: int = _ALL) -> Extent:
     look = _Cells(section, *section.outer_corners(), 64)
     chunk = max(_MIN_CHUNK, min(_CHUNK, _CHUNK * samples // _ALL))
     _fill_cells(look, rng, 2, 2, chunk)
-    margin = _MARGIN * (look.most - look.least)
-    low, high = look.least - margin, look.most + margin
+    margin = _MARGIN * (look.highest - look.lowest)
+    low, high = look.lowest - margin, look.highest + margin
     if section.revolute:
         low[0] = max(low[0], 0.0)
     side = min(_SIDE, math.isqrt(4 * _SIDE**2 * chunk // _CHUNK))  # most cells finer than that stay empty
@@ -182,7 +182,7 @@ class _Cells:
         cells = math.prod(self.shape) * count
         self.start_low = np.full(cells, np.inf)
         self.start_high = np.full(cells, -np.inf)
-        self.least, self.most = np.full(len(low), np.inf), np.full(len(low), -np.inf)
+        self.lowest, self.highest = np.full(len(low), np.inf), np.full(len(low), -np.inf)
         self._notable = self.stretch / 64
 
     def add(self, q: Array) -> NDArray[np.bool_]:
@@ -190,7 +190,7 @@ class _Cells:
         place, start = self.section.place(q)
         cell = np.zeros(len(q), dtype=np.int64)
         for axis, x in enumerate(place):
-            self.least[axis], self.most[axis] = min(self.least[axis], x.min()), max(self.most[axis], x.max())
+            self.lowest[axis], self.highest[axis] = min(self.lowest[axis], x.min()), max(self.highest[axis], x.max())
             index = ((x - self.low[axis]) / self.size[axis]).astype(np.int64)
             cell = cell * self.shape[axis] + np.clip(index, 0, self.shape[axis] - 1)
         if self.stretches > 1:

@@ -143,8 +143,8 @@ class Part(NamedTuple):
     high: Array
     nearest: float
     farthest: float
-    least: Array
-    most: Array
+    lowest: Array
+    highest: Array
     q: Array
     tip: Array
     values: list[Array]
@@ -164,8 +164,8 @@ def survey_chunk(job: Job, number: int) -> Part:
         high=tip.max(axis=0),
         nearest=float(distance.min()),
         farthest=float(distance.max()),
-        least=np.array([value.min() for value in values]),
-        most=np.array([value.max() for value in values]),
+        lowest=np.array([value.min() for value in values]),
+        highest=np.array([value.max() for value in values]),
         q=q[rows],
         tip=tip[rows],
         values=[value[rows] for value in values],
@@ -187,7 +187,7 @@ class _Tally:
         self.arm, self.samples, self.free = arm, 0, 0
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.nearest, self.farthest = np.inf, 0.0
-        self.least, self.most = np.full(measures, np.inf), np.full(measures, -np.inf)
+        self.lowest, self.highest = np.full(measures, np.inf), np.full(measures, -np.inf)
         self._share = keep / count
         self._rng = np.random.default_rng([seed, 1])
         self._chosen_samples: list[Array] = []
@@ -198,7 +198,7 @@ class _Tally:
         self.free += part.free
         self.low, self.high = np.minimum(self.low, part.low), np.maximum(self.high, part.high)
         self.nearest, self.farthest = min(self.nearest, part.nearest), max(self.farthest, part.farthest)
-        self.least, self.most = np.minimum(self.least, part.least), np.maximum(self.most, part.most)
+        self.lowest, self.highest = np.minimum(self.lowest, part.lowest), np.maximum(self.highest, part.highest)
         if self._share > 0:
             kept_samples = self._rng.random(part.samples) < self._share if self._share < 1 else slice(None)
             self._chosen_samples.append(np.column_stack([part.q, part.tip, *part.values])[kept_samples])
@@ -215,7 +215,8 @@ class _Tally:
             reach=(self.nearest, self.farthest),
             extent=size,
             measures={
-                name: (float(low), float(high)) for name, low, high in zip(names, self.least, self.most, strict=True)
+                name: (float(low), float(high))
+                for name, low, high in zip(names, self.lowest, self.highest, strict=True)
             },
             seconds=seconds,
             joints=samples[:, :n],

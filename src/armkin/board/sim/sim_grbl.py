@@ -33,7 +33,7 @@ class Block:
     end: tuple[int, ...]
     length: float  # [units]
     feed: float  # [units/s] as asked for
-    most: float  # [units/s] that the axes allow
+    max_speed: float  # [units/s] that the axes allow
     accel: float  # [units/s2]
     jog: bool = False
     distance_done: float = 0.0  # [units]
@@ -43,7 +43,7 @@ class Block:
     def advance(self, seconds: float, override: int, is_holding: bool) -> float:
         """Go on for some seconds; the share of the way that is done."""
         left, change = self.length - self.distance_done, self.accel * seconds
-        speed = min(self.feed * override / 100, self.most)
+        speed = min(self.feed * override / 100, self.max_speed)
         if is_holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
             self.rate = max(0.0 if is_holding else change, self.rate - change)
         else:

@@ -242,7 +242,7 @@ class IkQuestions:
         branch_table = ik_columns.branch_columns(
             self.request, targets, numbers, self.all_branches, nearest_in_c, rounding=rounding
         )
-        return branch_table.table, ~branch_table.unsolved
+        return branch_table.table, ~branch_table.is_unsolved
 
     def _table_of_objects(self, chunk: Chunk) -> tuple[Table, Any]:
         """What `table` returns, by way of an object a row, for what is not asked of each row by itself."""

@@ -72,6 +72,6 @@ def _close_to_limits(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
     if reduced.count:
         lines.append(
             f"{reduced.count} blend{'s' * (reduced.count > 1)} made smaller, to half of a side: "
-            f"the smallest from {reduced.wished:g} to {reduced.became:.4g} mm"
+            f"the smallest from {reduced.wished_radius:g} to {reduced.reduced_radius:.4g} mm"
         )
     return lines

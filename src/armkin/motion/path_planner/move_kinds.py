@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def _do_joint_move(walk: Walk, move: Move, value: Any) -> None:
     walk.close_group()
-    walk.untried_postures, walk.refused = (), None
+    walk.untried_postures, walk.refusal = (), None
     goal = path_numbers.joint_values(walk.arm, walk.q, value)
     walk.append_joint_move(goal, move)
     walk.begin_group(None)
@@ -29,7 +29,7 @@ def _do_joint_move(walk: Walk, move: Move, value: Any) -> None:
 def _do_point(walk: Walk, move: Move, value: list[float]) -> None:
     goal = walk.target(value)
     walk.close_group()
-    walk.leads, walk.untried_postures, walk.refused = move, (), None
+    walk.leads, walk.untried_postures, walk.refusal = move, (), None
     walk.begin_group(goal, move.branch)
 
 

@@ -62,7 +62,7 @@ class Walk:
     opening = False  # whether the path's first posture is still to be chosen
     leads: Move | None = None  # the move of the file that goes to a group's first point
     untried_postures: tuple[Array, ...] = ()  # postures of the last target that are still to be tried
-    refused: NoSolutionError | None = None  # the error of the first posture that failed
+    refusal: NoSolutionError | None = None  # the error of the first posture that failed
     before_posture: Walk | None = None  # a copy of the walk before it moved to that target
     current_moves = group = 0, 0  # numbers, from 0, of the first and last move: of this step, of the group
 
@@ -109,12 +109,12 @@ class Walk:
                 walk._carry_out_move(kinds, number)
                 number += 1
             except NoSolutionError as error:
-                walk.refused = walk.refused or error
-                saved_posture, postures, refusal = walk.before_posture, walk.untried_postures, walk.refused
+                walk.refusal = walk.refusal or error
+                saved_posture, postures, refusal = walk.before_posture, walk.untried_postures, walk.refusal
                 if saved_posture is None or not postures:
                     raise refusal from None
                 walk = _copy_walk(saved_posture)
-                walk.before_posture, walk.untried_postures, walk.refused = saved_posture, postures, refusal
+                walk.before_posture, walk.untried_postures, walk.refusal = saved_posture, postures, refusal
                 number = walk.current_moves[0]
         plan, pace = walk.plan, self.pace
         plan.approach = approach_move(self.arm, start, walk.begun, pace.speed, pace.accel, pace.jerk)

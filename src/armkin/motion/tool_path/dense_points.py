@@ -188,7 +188,7 @@ def _fit_block(task: Task, spots: _Spots, block: _Block, tolerance: float) -> li
         first_bend, last_bend = np.searchsorted(bends, block_ends).tolist()
         first_span, last_span = np.searchsorted(spans, block_ends).tolist()
         dense = Dense(
-            given=lengths[a : b + 1] - low,
+            given_lengths=lengths[a : b + 1] - low,
             points=spots.positions[numbers[a : b + 1]],
             bends=bends[first_bend:last_bend] - low,
             spans=spans[first_span:last_span] - low,

@@ -88,7 +88,7 @@ def turn_between(task: Task, a: Spot, b: Spot) -> Array:
 class Dense:
     """The given points from which a piece was fitted; all lengths [mm] are along the piece."""
 
-    given: Array  # (N,) where each point is passed
+    given_lengths: Array  # (N,) where each point is passed
     points: Array  # (N, 2 or 3) the points' positions
     bends: Array  # (k,) where the curvature jumps
     spans: Array  # (m,) where its cubics begin and end
@@ -98,10 +98,10 @@ class Dense:
 
     def part(self, a: float, b: float) -> Dense:
         """The points and lengths of the part from length a to b [mm]."""
-        is_given, bends = ((x > a) & (x < b) for x in (self.given, self.bends))
+        is_given, bends = ((x > a) & (x < b) for x in (self.given_lengths, self.bends))
         return replace(
             self,
-            given=self.given[is_given] - a,
+            given_lengths=self.given_lengths[is_given] - a,
             points=self.points[is_given],
             bends=self.bends[bends] - a,
             spans=self.spans[(self.spans > a) & (self.spans < b)] - a,

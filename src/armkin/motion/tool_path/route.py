@@ -98,7 +98,9 @@ class Route:
         dense = [(self.ends[k], piece.dense) for k, piece in enumerate(self.pieces) if piece.dense is not None]
         if not dense:
             return np.zeros(0), np.zeros((0, self.task.position))
-        return np.concatenate([begin + d.given for begin, d in dense]), np.concatenate([d.points for _, d in dense])
+        return np.concatenate([begin + d.given_lengths for begin, d in dense]), np.concatenate(
+            [d.points for _, d in dense]
+        )
 
     @cached_property
     def _paces(self) -> tuple[Array, Array, Array]:
@@ -128,16 +130,16 @@ class ReducedBlends:
     """The number of blends that did not fit, and the wanted and actual radius [mm] of the smallest."""
 
     count: int = 0
-    wished: float = 0.0
-    became: float = np.inf
+    wished_radius: float = 0.0
+    reduced_radius: float = np.inf
 
-    def note(self, wished: float, became: float) -> None:
+    def note(self, wished_radius: float, reduced_radius: float) -> None:
         """Count a blend whose radius was reduced."""
-        if became >= wished * (1 - 1e-9):
+        if reduced_radius >= wished_radius * (1 - 1e-9):
             return
         self.count += 1
-        if became < self.became:
-            self.wished, self.became = wished, became
+        if reduced_radius < self.reduced_radius:
+            self.wished_radius, self.reduced_radius = wished_radius, reduced_radius
 
 
 def join_pieces(
@@ -209,7 +211,7 @@ def _dense_of_corner(piece: Piece, corner: Array) -> Dense:
     """The given point of a blend: its corner, passed in the middle."""
     none = np.zeros(0)
     return Dense(
-        given=np.array([piece.length / 2]),
+        given_lengths=np.array([piece.length / 2]),
         points=corner[None],
         bends=none,
         spans=none,

@@ -332,8 +332,8 @@ def _question(
         step=settings["yaw"],
         z=settings["z"],
         obstacles=obstacles,
-        ways=path_lengths,
-        spare=redundant_joint,
+        path_lengths=path_lengths,
+        redundant_joint=redundant_joint,
         values=held_values,
     )
 
@@ -346,7 +346,9 @@ def _parts(
         return None
     files.file_ending(out, "places are", ENDINGS)
     files.check_writable(os.fspath(out))
-    robots = [[q.arm.sha256, q.obstacles.sha256, digest(q.targets.tobytes()), *q.ways, *q.values] for q in questions]
+    robots = [
+        [q.arm.sha256, q.obstacles.sha256, digest(q.targets.tobytes()), *q.path_lengths, *q.values] for q in questions
+    ]
     inputs = {"command": "place", "armkin": __version__, "robots, scene and targets": robots, **settings}
     inputs["solve"] = [f"{question.solve.__module__}.{question.solve.__qualname__}" for question in questions]
     return Parts(os.fspath(out), inputs)

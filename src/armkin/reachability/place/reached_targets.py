@@ -51,8 +51,8 @@ class PlaceQuestion(NamedTuple):
     step: float  # [rad] of the yaw
     z: float
     obstacles: Obstacles = Obstacles()
-    ways: tuple[int, ...] = ()  # number of targets of each part of a path that one branch has to follow
-    spare: str = ""  # name of the redundant joint that a plan holds
+    path_lengths: tuple[int, ...] = ()  # number of targets of each part of a path that one branch has to follow
+    redundant_joint: str = ""  # name of the redundant joint that a plan holds
     values: tuple[float, ...] = ()  # its possible values [rad], the best first
     full_arm: HeldArm | None = None  # set after one of the values is chosen
     solve: Solve = ik  # a function of a module, as it is pickled
@@ -126,8 +126,10 @@ def each_value(question: PlaceQuestion) -> Iterator[PlaceQuestion]:
     if not question.values:
         yield question
     for value in question.values:
-        full_arm = HeldArm(question.arm, {question.spare: value})
-        free_arm = _hold_joint(question.arm, question.spare, value)  # many arms, each too short-lived for compiling
+        full_arm = HeldArm(question.arm, {question.redundant_joint: value})
+        free_arm = _hold_joint(
+            question.arm, question.redundant_joint, value
+        )  # many arms, each too short-lived for compiling
         yield question._replace(arm=free_arm, values=(), full_arm=full_arm, solve=ik)
 
 
@@ -158,10 +160,10 @@ def _hold_joint(arm: Arm, joint: str, value: float) -> Arm:
 
 def _count_targets(question: PlaceQuestion, positions: Array, is_legal: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Number of legal targets, (P, N, K) -> (P, K); parts of a path without a common branch count as incomplete."""
-    if not question.ways:
+    if not question.path_lengths:
         return np.asarray(is_legal.sum(axis=1, dtype=np.int64))
     counts, begin = np.zeros((len(positions), question.yaws), np.int64), 0
-    for length in question.ways:
+    for length in question.path_lengths:
         part = slice(begin, begin + length)
         count = is_legal[:, part].sum(axis=1, dtype=np.int64)
         has_all = count == length

@@ -37,12 +37,12 @@ class Radii(NamedTuple):
 
     spacing: float
     first: Array
-    sure: Array
+    sure_distance: Array
     open: Array
 
     def of_target(self, i: int) -> Radii:
         """The branches (B, C) of one target."""
-        return Radii(self.spacing, self.first[i], self.sure[i], self.open[i])
+        return Radii(self.spacing, self.first[i], self.sure_distance[i], self.open[i])
 
 
 class Feet(NamedTuple):
@@ -104,7 +104,7 @@ def _answers_from_feet(arm: Arm, branches: Radii, target: Array, feet: Feet) -> 
     angle *= 1.0 if arm.link[0][2, 2] > 0 else -1.0
     angle -= _range_middle(arm, 0)
     is_reached, is_possible = np.zeros(len(in_reach), bool), np.zeros(len(in_reach), bool)
-    for first, sure_distance, greatest in zip(branches.first, branches.sure, branches.open, strict=True):
+    for first, sure_distance, greatest in zip(branches.first, branches.sure_distance, branches.open, strict=True):
         if (greatest < 0.0).all():
             continue
         offset = first.take(cell)
