@@ -34,7 +34,7 @@ MUTANTS = [
         "model/build_arm.py", "[0, ca, -sa, 0], [0, sa, ca, 0]", "[0, ca, sa, 0], [0, -sa, ca, 0]", "test_published.py"
     ),
     Mutant("model/units.py", "dtype=float) * joint_scale(arm)", "dtype=float) / joint_scale(arm)", "test_published.py"),
-    Mutant("motors.py", "(0.5 + slack)", "slack", "test_motors.py"),
+    Mutant("motors.py", "(0.5 + tolerance)", "tolerance", "test_motors.py"),
     Mutant("robot_file/strict_yaml.py", "    if text in parent.items:", "    if text in parent.items and False:",
            "robot_file"),
     Mutant("inverse/branches/whole_turns.py", "(value >= low) & (value <= high)", "(value >= low)",
@@ -64,7 +64,7 @@ MUTANTS = [
     Mutant("cli/exit_codes.py", "NO_SOLUTION = 3\nROBOT_FILE = 4", "NO_SOLUTION = 4\nROBOT_FILE = 3",
            "cli/test_cli_errors.py cli/test_cli_commands.py"),
     Mutant("motion/timing/limit_jerk.py", "(2 * accel / np.asarray", "(accel / np.asarray", "motion"),
-    Mutant("keep_out/motion_proof.py", "(clearances[:-1] + clearances[1:] - moved) / 2",
+    Mutant("keep_out/motion_proof.py", "(clearances[:-1] + clearances[1:] - motions) / 2",
            "(clearances[:-1] + clearances[1:]) / 2", "keep_out"),
     Mutant("motion/tool_path/corner_blend.py", "omega - np.cross(w, omega) / 2", "omega + np.cross(w, omega) / 2",
            "motion"),
@@ -74,9 +74,9 @@ MUTANTS = [
            "board/test_feetech_bus.py"),
     Mutant("robot_file/urdf_reader.py", "(cr, sr), (cp, sp), (cy, sy)", "(cy, sy), (cp, sp), (cr, sr)", "robot_file"),
     Mutant("forward.py", "arrays.cross(z, lever)", "arrays.cross(lever, z)", "inverse/test_kinematics.py"),
-    Mutant("inverse/choose_branch.py", "not branch.within_limits, hit, turned", "not branch.within_limits, turned, hit",
+    Mutant("inverse/choose_branch.py", "not branch.within_limits, hit, angle", "not branch.within_limits, angle, hit",
            "keep_out inverse/test_position_first.py"),
-    Mutant("columns/finished_chunks.py", "if before.get(name) != self.job.get(name)", "if name not in before",
+    Mutant("columns/finished_chunks.py", "if earlier_job.get(name) != self.job.get(name)", "if name not in earlier_job",
            "columns"),
 ]  # fmt: skip
 QUICK = ["-m", "not slow and not emulator"]

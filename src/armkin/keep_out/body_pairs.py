@@ -43,7 +43,7 @@ class Guard:
     pairs: tuple[Pair, ...]
     left_out: tuple[tuple[str, str], ...]
     moving_segments: NDArray[np.intp]  # segments that may hit obstacles, sorted by body
-    first: NDArray[np.intp]  # index in `moving` of the first segment of each body
+    first: NDArray[np.intp]  # index in `moving_segments` of the first segment of each body
     ours: NDArray[np.intp]  # (M,) segments of the later body, sorted by pair of bodies
     theirs: NDArray[np.intp]  # (M,) segments of the earlier body
     starts: NDArray[np.intp]  # index in `ours` and `theirs` of the first item of each pair

@@ -80,7 +80,7 @@ def _residuals(arm: Arm, task: Task, T: Array, q: Array, target: Array) -> Array
 
 
 def _damped_steps(J: Array, residuals: Array, damping: float) -> Array:
-    """Solutions x (n, M) of (J'J + damping 1) x = J'r: column by column J (n, k, M), and r (k, M), by Cholesky.
+    """Solutions x (n, M) of (J'J + damping 1) x = J'r: J (n, k, M) by columns, residuals r (k, M), by Cholesky.
 
     Over all members at once it takes a fraction of the time of `np.linalg.solve` on small matrices.
     """

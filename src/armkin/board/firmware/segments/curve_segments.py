@@ -107,7 +107,8 @@ class CurveSegments:
         ends = exact_pulses(self.arm, self.stretch.evaluate(np.array([0.0, duration])))
         counts = exact_pulses(self.arm, self.stretch.evaluate(t))
         for offset, time_to_end in ((self.start - ends[0], t), (self.end - ends[1], duration - t)):
-            span = np.sqrt(6 * np.abs(offset) / (_SETTLING_SHARE * motor_accel(self.arm)))  # f^2 (3 - 2 f) bends by 6
+            # fraction^2 (3 - 2 fraction) bends by 6
+            span = np.sqrt(6 * np.abs(offset) / (_SETTLING_SHARE * motor_accel(self.arm)))
             fraction = np.clip(time_to_end[:, None] / np.clip(span, 1e-9, duration), 0.0, 1.0)
             counts = counts + offset * (1 - fraction * fraction * (3 - 2 * fraction))
         return np.asarray(counts)
