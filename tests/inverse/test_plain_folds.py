@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.run import chunks, edges, folds
-from armkin.inverse.singular import components, local_structure, second_order
+from armkin.inverse.singular import groups, local_structure, second_order
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 
@@ -54,7 +54,7 @@ def test_plain_folds_are_those_that_one_by_one_are_found(name: str, monkeypatch:
     q = np.concatenate([beside_folds(arm), rng.integers(-4, 4, (8, arm.n)) * np.pi / 4])
     target = np.asarray(targets_of(task_for(arm), armkin.fk(arm, q), q))
     short = armkin.ik(arm, target)
-    monkeypatch.setattr(components, "FEW_CANDIDATES", 0)
+    monkeypatch.setattr(groups, "FEW_CANDIDATES", 0)
     long = armkin.ik(arm, target)
     assert {0, 1} <= set(short.status.tolist())
     for field in ("status", "valid", "free", "complete"):

@@ -15,7 +15,7 @@ from armkin import Status
 from armkin.inverse.answers.batch import Examined, Goals
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import newton
-from armkin.inverse.singular import components
+from armkin.inverse.singular import groups
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.tasks.task import shifted_targets, targets_of
 from armkin.model.arm import Arm
@@ -58,13 +58,13 @@ def test_most_doubtful_targets_are_decided_at_once(name: str, monkeypatch: pytes
     """Random targets of which two branches lie 3e-5 to 3e-4 rad apart: most are told by their Jacobians, the others at
     once."""
     doubtful_counts = []
-    examine = components.examine
+    examine = groups.examine
 
     def count_and_call(goals: Goals, *more: Any) -> Examined:
         doubtful_counts.append(len(goals.target))
         return examine(goals, *more)
 
-    monkeypatch.setattr(components, "examine", count_and_call)
+    monkeypatch.setattr(groups, "examine", count_and_call)
     arm, _ = shipped_arm(name)
     task, _ = solver(arm, None)
     screw = shipped_arm(name)[1]
@@ -103,7 +103,7 @@ def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkey
     """Two branches end where the elbow is straight: both are on one side, on the other none; nothing is searched."""
     arm, screw = shipped_arm(name)
     task, _ = solver(arm, None)
-    monkeypatch.setattr(components, "examine", lambda *_: pytest.fail("searched from many starts"))
+    monkeypatch.setattr(groups, "examine", lambda *_: pytest.fail("searched from many starts"))
     for posture in np.random.default_rng(5).uniform(0.3, 0.7, (4, arm.n)):
         posture[2] = 0.0
         target = goal_of_joints(task, screw, posture[None]).array()

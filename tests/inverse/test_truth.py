@@ -20,7 +20,7 @@ import armkin
 from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.answers.batch import Goals
-from armkin.inverse.singular import components
+from armkin.inverse.singular import groups
 from armkin.inverse.solvers.recognise import solver
 from armkin.model.arm import from_links
 
@@ -210,13 +210,13 @@ def test_a_rounded_rotation_is_made_orthonormal_first() -> None:
 def test_a_rounded_pose_takes_no_second_look(monkeypatch: pytest.MonkeyPatch) -> None:
     """Nor does one of an arm a thousand times as long: the closed form's own answers are accepted."""
     examined: list[int] = []
-    examine = components.examine
+    examine = groups.examine
 
     def count_and_call(goals: Goals, *arguments: object) -> object:
         examined.append(len(goals.target))
         return examine(goals, *arguments)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(components, "examine", count_and_call)
+    monkeypatch.setattr(groups, "examine", count_and_call)
     arm = shipped_arm("puma560")[0]
     q = np.random.default_rng(0).uniform(-2, 2, (1000, 6))
     link = arm.link.copy()

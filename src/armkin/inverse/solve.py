@@ -36,7 +36,7 @@ from armkin.inverse.singular import legal_postures, near_itself
 from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import redundancy
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around
+from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around, targets_at
 from armkin.model.arm import Arm, actual_arm
 
 THREAD_POSES = 256  # fewest poses of an elimination for a thread, and size of its chunks
@@ -218,7 +218,8 @@ def _row_by_row(goals: Goals, geometry: Geometry, examine: bool, workers: int) -
     for rows in arrays.slices(len(count), arrays.CHUNK):
         pack_branches(rows_of(batch, rows), count[rows])
     if examine:
-        doubt[near_itself.put_near(goals, batch, near_itself.at_tip(arm, task, target, position(arm, near)))] = True
+        at_near = targets_at(task, target, position(arm, near), near_itself.ROOM * arm.reach)
+        doubt[near_itself.put_near(goals, batch, at_near)] = True
     doubted = np.flatnonzero(doubt)
     if examine and len(doubted):
         candidates = q[doubted] if guesses is None else np.concatenate([q[doubted], guesses[doubted]], axis=1)

@@ -14,7 +14,7 @@ class Rows(NamedTuple):
     """The result of a solver that works row by row.
 
     q: (N, B, n) branches [rad | mm], nan past a target's last one.  doubt: (N,) targets to be examined by
-    `inverse.singular.components`.  complete: (N,) whether every isolated branch is there.  lost: (N,) whether singular
+    `inverse.singular.groups`.  complete: (N,) whether every isolated branch is there.  lost: (N,) whether singular
     postures may be missing.  guesses: (N, G, n) postures that may be close to those.
     """
 

@@ -22,7 +22,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.run.edges import AT_ONCE, decide_edges
 from armkin.inverse.run.folds import Doubted, decide_folds
 from armkin.inverse.singular import near_itself
-from armkin.inverse.tasks.task import Task, read_poses
+from armkin.inverse.tasks.task import Task, read_poses, targets_at
 from armkin.model.arm import Arm
 
 TURNED_AT_ONCE = 512  # poses transposed at once, which fit a core's cache
@@ -67,7 +67,7 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
             at_tip = np.empty(0, np.intp)
             if examine:
                 tips, x = position(arm, close) if tip is None else tip, entries[9 if task.orientation == "full" else 0]
-                at_tip = near_itself.at_tip(arm, task, goal, tips, x)
+                at_tip = targets_at(task, goal, tips, near_itself.ROOM * arm.reach, x)
             part = Goals(arm, task, goal, near[chunk])
             doubted = _write_chunk(part, (*runner.axes, len(goal)), rows_of(batch, chunk), outputs, close, at_tip)
             on_edge.append(doubted._replace(rows=start + doubted.rows))
@@ -97,7 +97,7 @@ def _write_chunk(
     goals: Goals, shape: tuple[int, ...], part: Batch, outputs: list[Any], near: Array, at_tip: Int
 ) -> Doubted:
     """Write a chunk's branches, of a shape (b0, b1, b2, N), as rows (N, B) at their nearest legal copies; returns the
-    targets on an edge. at_tip: the result of `near_itself.at_tip`, empty without examination."""
+    targets on an edge. at_tip: those where the tool is at `near`, none without examination."""
     *values, miss, doubt, _ = outputs
     miss = np.broadcast_to(miss, shape)
     valid = (miss <= tol.ACCEPTED**2).reshape(-1, shape[-1])
@@ -177,7 +177,7 @@ def columns(arm: Arm, task: Task, geometry: Geometry, target: Array, kept: bool 
         shape = (*runner.axes, N)
         *values, miss = (np.broadcast_to(column, shape).reshape(B, N) for column in outputs)
         valid: Bool = np.asarray(miss <= tol.ACCEPTED**2)
-        left = np.union1d(_on_edge(doubt, miss, valid), near_itself.at_tip(arm, task, goal, tip))
+        left = np.union1d(_on_edge(doubt, miss, valid), targets_at(task, goal, tip, near_itself.ROOM * arm.reach))
         yield Columns(slice(start, start + N), values, miss, valid, left)
 
 

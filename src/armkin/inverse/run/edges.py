@@ -1,4 +1,4 @@
-"""Targets with a nearly singular candidate: prepares their seeds for `singular.components`, and writes its answers."""
+"""Targets with a nearly singular candidate: prepares their seeds for `singular.groups`, and writes its answers."""
 
 from typing import NamedTuple
 
@@ -10,7 +10,8 @@ from armkin.forward import position
 from armkin.inverse.answers.batch import Batch, Goals, Seeds, write_branches
 from armkin.inverse.closed.candidates import Recorded
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import components, linkages, near_itself, surfaces
+from armkin.inverse.singular import groups, linkages, near_itself, surfaces
+from armkin.inverse.tasks.task import targets_at
 
 AT_ONCE = 1024  # targets examined in one call
 
@@ -116,7 +117,7 @@ def _doubted_targets(goals: Goals, runner: Recorded, rows: Int) -> _Doubts:
     outputs = branch_rows(runner.in_numbers(target), len(rows))
     tight, (miss, edge, free) = outputs[:, :, :-3], np.moveaxis(outputs[:, :, -3:], 2, 0)
     is_plain: Bool = np.asarray((edge == 0.0) & (free == 0.0) & (not runner.geometry.ends))
-    is_plain[near_itself.at_tip(arm, task, target, position(arm, near))] = False
+    is_plain[targets_at(task, target, position(arm, near), near_itself.ROOM * arm.reach)] = False
     is_wrong = is_plain & (miss > tol.NEARBY**2)
     tight = np.where(is_wrong[:, :, None], np.nan, tight)
     ends, narrow = np.zeros((2, len(rows)), bool)
@@ -154,17 +155,17 @@ def _candidates_at_two(runner: Recorded, target: Array, values: Array, second: A
 
 
 def examine_targets(
-    goals: Goals, batch: Batch, doubted: Int, seeds: Seeds, more: components.More, unsettled: Bool | None = None
+    goals: Goals, batch: Batch, doubted: Int, seeds: Seeds, more: groups.More, unsettled: Bool | None = None
 ) -> Batch:
     """Examine the doubted targets and write their branches, with nan behind.
 
-    seeds: their candidates; more, unsettled: (N,), see `components.examine`.
+    seeds: their candidates; more, unsettled: (N,), see `groups.examine`.
     """
     for part in slices(len(doubted), AT_ONCE):
         rows = doubted[part]
         subset = goals.of(rows)
         lacking = (None, None) if unsettled is None else (unsettled[rows], unsettled[rows] & ~batch.complete[rows])
-        decision = components.examine(subset, rows_of(seeds, part), more, *lacking)
+        decision = groups.examine(subset, rows_of(seeds, part), more, *lacking)
         if decision.surface.any():
             decision = surfaces.list_swept(subset, decision)
         batch = write_branches(goals.arm, batch, rows, decision.q, decision.valid, decision.label, subset.near)

@@ -1,75 +1,24 @@
-"""Targets on an edge: merging roots, singular postures, self-motions, boundaries.
+"""What components of the solution set candidates of targets on an edge lie on.
 
-The solvers say which targets are in doubt. One pass over them, with the Jacobian, is the mechanism behind the words
-exact, boundary, singular and unreachable. Candidate postures are moved onto their targets, and grouped: those on one
-component of the solution set are one branch. Regular postures with none close by need no more than an inverse; of weak
-ones `local_structure` tells the component.
+Of regular postures with none close by nothing need be asked. `local_structure` tells the component of those that lose
+one direction, as far as one polynomial holds, and `chains` beyond; a push tells whether others move.
 """
 
-from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import replace_rows, rows_of, widen_columns
+from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int
-from armkin.inverse.answers.batch import OWN_LABEL, Examined, Goals, Seeds
-from armkin.inverse.answers.solutions import Status
+from armkin.inverse.answers.batch import Goals
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import chains, curves, high_order_roots, meetings, self_motions
+from armkin.inverse.singular import chains, high_order_roots, self_motions
 from armkin.inverse.singular.local_structure import local_structure
 
-AT_ONCE = 128  # candidates from which on asking all together is cheaper than one after the other
-FEW_CANDIDATES = 24  # candidates of a target that are compared all with all
-PATIENCE = 6  # steps with hardly any gain after which a candidate is left where it is
 
-# Takes targets (R, ...), preferred values (R, n) and whether branches seem lost (R,); returns more postures (R, M, n),
-# their branches (M,), and of which targets (R,) a search from many starts may find others.
-More = Callable[[Array, Array, Bool], tuple[Array, Int, Bool]]
-
-
-def examine(
-    goals: Goals, seeds: Seeds, more: More, unsettled: Bool | None = None, incomplete: Bool | None = None
-) -> Examined:
-    """Correct, group and classify candidate branches of doubted targets.
-
-    goals: K targets; `near` is a branch itself where it solves its target. more: finds other candidates, for targets
-    that seem to have no branch, for those of which the preferred value leaves the other joints no solution, and for
-    self-motions that may meet others. unsettled: (K,) targets whose solver may have lost singular candidates: `more`
-    is called for these, and for all that are singular. incomplete: (K,) targets that `more` takes for lost.
-    """
-    state = _settle_seeds(goals, seeds, tol.SEED_RESIDUAL)
-    retry = state.again | state.surface | ~(state.valid.any(axis=1) | (state.beyond & (unsettled is None)))
-    if unsettled is None:
-        # a self-motion of joints more than one apart goes through postures in which others move, too
-        first, last = state.moved.argmax(axis=1), goals.arm.n - 1 - state.moved[:, ::-1].argmax(axis=1)
-        wants_more = retry | state.moved.any(axis=1) & (last - first > 2)
-    else:
-        wants_more = retry | unsettled | (state.status != Status.EXACT)
-    if not len(rows := np.flatnonzero(wants_more)):
-        return state._replace(again=retry)
-    lost = retry if incomplete is None else retry | incomplete
-    more_candidates, labels, wants_starts = more(goals.target[rows], goals.near[rows], lost[rows])
-    if unsettled is None:  # another self-motion may meet a surface along a line, or at a point
-        wants_starts |= state.surface[rows]
-    if wants_starts.any():
-        starts = newton.many_starts(goals.arm, goals.task, goals.target[rows], wants_starts)
-        labels = np.append(labels, np.zeros(starts.shape[1], int))
-        more_candidates = np.concatenate([more_candidates, starts], axis=1)
-    has_candidates: Bool = np.asarray(~np.isnan(more_candidates[:, :, 0]).all(axis=1))
-    useful = retry[rows] | has_candidates
-    retry[rows] &= has_candidates  # nothing anywhere near: out of reach, and known to be
-    rows, more_candidates = rows[useful], more_candidates[useful]
-    if not len(rows):
-        return state._replace(again=retry)
-    label = np.concatenate([state.label[rows], np.broadcast_to(labels, more_candidates.shape[:2])], axis=1)
-    all_seeds = Seeds.of(np.concatenate([state.q[rows], more_candidates], axis=1), label)
-    return replace_rows(state, rows, _settle_seeds(goals.of(rows), all_seeds, tol.HOPELESS))._replace(again=retry)
-
-
-class _Candidates(NamedTuple):
+class Candidates(NamedTuple):
     """Candidates of K targets, `near` the first of each."""
 
     q: Array  # (K, M, n)
@@ -79,14 +28,14 @@ class _Candidates(NamedTuple):
     simple: Bool  # (K, M) branches that need no examination
 
 
-class _Components:
-    """What components of the solution set candidates lie on, and what is listed of these."""
+class Components:
+    """What components of the solution set the candidates of K targets lie on, as far as that was asked."""
 
-    def __init__(self, goals: Goals, candidates: _Candidates, lost: newton.Lost, rests: Bool) -> None:
+    def __init__(self, goals: Goals, candidates: Candidates, lost: newton.Lost, rests: Bool) -> None:
         """rests: (K, M) those that no push takes along a self-motion."""
         self.goals, self.candidates = goals, candidates
         self.lost, self.rests = lost, rests
-        (K, M, n), simple = candidates.q.shape, candidates.simple
+        (K, M, _), simple = candidates.q.shape, candidates.simple
         on_motion: Bool = np.asarray(candidates.sure.any(axis=2))
         # of each candidate, (K, M) or (K, M, n):
         self.valid: Bool = np.asarray(candidates.size <= tol.SOLUTION)
@@ -95,22 +44,18 @@ class _Components:
         # `near` leads its group, else the most exact candidate: one between two branches must not join them
         self.rank = np.maximum(candidates.size, tol.EQUAL_RESIDUALS)
         self.rank[:, 0] = 0.0
-        self.ungrouped: Bool = self.valid & ~simple  # whether it is in no group yet
         self.near_singular: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLD_VALUE) & ~on_motion
         lost.sigma[on_motion] = 0.0
-        self.followed: Bool = ~(self.ungrouped & self.near_singular)  # whether its component is followed, if need be
-        self.pushed = self.followed.copy()  # whether it is pushed, if need be
+        self.followed: Bool = ~(self.valid & ~simple & self.near_singular)  # whether that is done, or needless
+        self.pushed = self.followed.copy()  # likewise
         self.known = on_motion.copy()  # whether its component is known
         self.on_manifold = on_motion.copy()  # whether that is a self-motion manifold
         self.moving_joints = candidates.sure.copy()  # those that move along the manifold
         self.ended = np.zeros((K, M), bool)  # whether both ends of the component are known
         self.uncrossed = on_motion.copy()  # whether they are, and no other curve crosses in between
         self.is_boundary = np.zeros((K, M), bool)  # whether two roots merge there
-        self.component_row = np.zeros((K, M), np.int64)  # its row of `components`, 0 as long as that is not known
-        self.components = np.zeros((1, M), bool)  # (rows, M) which candidates of a target are one
-        self.chosen, self.chosen_joints = simple.copy(), np.zeros((K, M, n), bool)  # what is listed, and moves there
-        # of each target:
-        self.free_joints, self.has_manifold, self.has_boundary = np.zeros((K, n), bool), *np.zeros((2, K), bool)
+        self.row = np.zeros((K, M), np.int64)  # its row of `members`, 0 as long as that is not known
+        self.members = np.zeros((1, M), bool)  # (rows, M) which candidates of a target are one
 
     @cached_property
     def tube(self) -> Array:
@@ -122,7 +67,7 @@ class _Components:
             widths[has_values] = tol.SOLUTION / np.maximum(S[place[has_values], n - 2], tol.WEAK)
         return widths
 
-    def _follow(self, k: Int, b: Int) -> None:
+    def follow(self, k: Int, b: Int) -> None:
         """Follow the components of those of these candidates that lose one direction, if that is not done."""
         (arm, task, target, _), q = self.goals, self.candidates.q
         unfollowed = ~self.followed[k, b]
@@ -138,14 +83,14 @@ class _Components:
             self.known[i, c], self.on_manifold[i, c] = curve.known, curve.manifold
             self.moving_joints[i, c], self.is_boundary[i, c] = curve.joints, curve.boundary
             self.ended[i, c], self.uncrossed[i, c] = curve.ended, curve.uncrossed
-            self.component_row[i, c] = np.where(curve.known, len(self.components) + np.arange(len(i)), 0)
-            self.components = np.concatenate([self.components, curve.members])
+            self.row[i, c] = np.where(curve.known, len(self.members) + np.arange(len(i)), 0)
+            self.members = np.concatenate([self.members, curve.members])
         self.pushed[k, b] = self.known[k, b] | self.rests[k, b] | ~(self.lost.sigma[k, b] < tol.MOVING_VALUE)
         self.rank[k, b] += np.where(self.pushed[k, b] | (b == 0), 0.0, 1.0)  # it may be on a component that is known
 
-    def _push(self, k: Int, b: Int) -> None:
-        """Push those of these candidates whose components `_follow` does not tell: do they move?"""
-        self._follow(k, b)
+    def push(self, k: Int, b: Int) -> None:
+        """Push those of these candidates whose components `follow` does not tell: do they move?"""
+        self.follow(k, b)
         unpushed = ~self.pushed[k, b]
         if unpushed.any():
             k, b = k[unpushed], b[unpushed]
@@ -154,16 +99,16 @@ class _Components:
             motion = self_motions.self_motion(arm, task, self.candidates.q[k, b], self.lost.V[k, b], lost, target[k])
             self.on_manifold[k, b], self.moving_joints[k, b] = motion
 
-    def _compare(self, k: Int, b: Int) -> None:
+    def compare(self, k: Int, b: Int) -> None:
         """Find the candidates that are one with these, whose components are not known."""
         (q, _, size, *_), (arm, task, target, _), sigma = self.candidates, self.goals, self.lost.sigma
-        self.component_row[k, b] = len(self.components) + np.arange(len(k))
+        self.row[k, b] = len(self.members) + np.arange(len(k))
         alike, distance = high_order_roots.equal_candidates(arm, task, q, k, b, sigma, size, target)
         has_twin = (alike & self.valid[k] & (distance > tol.ROUNDING_DISTANCE)).any(axis=1)
         self.is_boundary[k, b] = has_twin | (sigma[k, b] < tol.DOUBLE_VALUE)
-        self.components = np.concatenate([self.components, alike])
+        self.members = np.concatenate([self.members, alike])
 
-    def _inherit_manifolds(self, k: Int, b: Int, alike: Bool) -> None:
+    def inherit_manifolds(self, k: Int, b: Int, alike: Bool) -> None:
         """Components (m, M) become the manifold that begins at another of their candidates and has their own on it.
 
         Where a second direction is all but lost the curve through a candidate beside a manifold may leave it.
@@ -173,211 +118,11 @@ class _Components:
             return
         alike_vague = alike & is_vague[:, None]
         i, c = np.nonzero(alike_vague & (self.tube[k] > tol.STILL_TURN))
-        self._follow(k[i], c)
+        self.follow(k[i], c)
         i, c = np.nonzero(alike_vague & self.known[k] & self.on_manifold[k])
-        has_own = self.components[self.component_row[k[i], c], b[i]]
+        has_own = self.members[self.row[k[i], c], b[i]]
         i, first = np.unique(i[has_own], return_index=True)
         k, b, c = k[i], b[i], c[has_own][first]
-        alike[i] |= self.components[self.component_row[k, c]]
+        alike[i] |= self.members[self.row[k, c]]
         for array in (self.on_manifold, self.moving_joints, self.ended, self.uncrossed):
             array[k, b] = array[k, c]
-
-
-class _Groups(_Components):
-    """Which candidates are one: a candidate of each target at a time leads those that are one with it."""
-
-    def _group_plain(self) -> None:
-        """Group what needs no comparison one by one: regular candidates with none close by, isolated roots and
-        boundaries that are alone on their components or two, known self-motions where nothing else may be on them.
-        """
-        on_simple = self.components[self.component_row] & self.candidates.simple[:, None]  # branches as they stand
-        self.ungrouped &= ~on_simple.any(axis=2)
-        valid, sigma, M = self.ungrouped, self.lost.sigma, self.ungrouped.shape[1]
-        sure: Bool = np.asarray(self.candidates.sure.any(axis=2))
-        unsure, is_other = valid & ~sure, ~np.eye(M, dtype=bool)
-        close = np.zeros((len(valid), M, M), bool)
-        k, i, j = np.nonzero(unsure[:, :, None] & unsure[:, None] & is_other)
-        offset = newton.difference(self.goals.arm, self.candidates.q[k, i], self.candidates.q[k, j])
-        close[k, i, j] = np.abs(offset).max(axis=1, initial=0.0) < tol.CLOSE_DISTANCE
-        near_singular = unsure & self.near_singular
-        decided = near_singular & (self.component_row > 0) & ~self.on_manifold
-        may_move = near_singular & ~(decided & self.known & (sigma >= tol.SOLUTION))
-        is_single = np.where(sure, ~may_move.any(axis=1, keepdims=True), ~near_singular & ~close.any(axis=2)) & valid
-        is_open = (near_singular & (self.on_manifold | ~self.pushed)).any(axis=1)
-        decided &= ~np.asarray(is_open | (sure.any(axis=1) & may_move.any(axis=1)))[:, None]
-        rows = np.flatnonzero(decided.any(axis=1))
-        if len(rows):
-            pairable, known = decided[rows], self.known[rows]
-            alike = self.components[self.component_row[rows]] & valid[rows, None] & is_other & pairable[:, :, None]
-            pairable &= (alike == alike.swapaxes(1, 2)).all(axis=2) & ~(close[rows] & ~pairable[:, None]).any(axis=2)
-            pairable &= ~(alike & (known[:, :, None] != known[:, None])).any(axis=2)
-            pairable &= (alike.sum(axis=2) < 2) & ~alike[:, :, 0]
-            pairable &= (~alike | pairable[:, None]).all(axis=2)
-            # the most exact of each, the first of those that need no correction: the same in all arithmetics
-            size = np.maximum(self.candidates.size[rows], np.where(known, tol.ROUNDING_RESIDUAL, 0.0))
-            rank = np.argsort(np.argsort(size, axis=1, kind="stable"), axis=1)
-            leads = pairable & ~(alike & (rank[:, None] < rank[:, :, None])).any(axis=2)
-            self.chosen[rows] |= leads
-            self.has_boundary[rows] |= (leads & self.is_boundary[rows]).any(axis=1)
-            decided[rows] = pairable
-        self.chosen |= is_single
-        self.ungrouped &= ~(is_single | decided)
-        self.chosen_joints |= is_single[:, :, None] & self.moving_joints & sure[:, :, None]
-        self.has_manifold |= (is_single & sure).any(axis=1)
-        self.free_joints |= self.chosen_joints.any(axis=1)
-
-    def _group(self, k: Int, b: Int) -> None:
-        """One group of each of targets k (m,): those that are one with their b-th candidate (m,)."""
-        self._push(k, b)
-        if (uncompared := ~self.known[k, b] & (self.component_row[k, b] == 0)).any():
-            self._compare(k[uncompared], b[uncompared])
-        arm, near = self.goals.arm, self.goals.near
-        q, label, size, *_ = self.candidates
-        known = self.known[k, b]
-        size = np.where(known[:, None], np.maximum(size[k], tol.ROUNDING_RESIDUAL), size[k])  # as in `_group_plain`
-        offset = np.abs(newton.difference(arm, q[k], q[k, b][:, None]))  # (m, M, n)
-        group: Bool = np.asarray(self.components[self.component_row[k, b]])
-        unlisted = ~(group & self.candidates.simple[k]).any(axis=1)
-        self._inherit_manifolds(k, b, group)
-        moving, joints = self.on_manifold[k, b], self.moving_joints[k, b]
-        group &= self.ungrouped[k]
-        on_motion = self._on_motion(k, b, offset, group | ~self.ungrouped[k]) | (group & (known & moving)[:, None])
-        on_motion[np.arange(len(k)), b] = True
-        group |= on_motion  # what is one with it along a curve beside the self-motion is not on that
-        self.ungrouped[k] &= ~group
-        self.has_boundary[k] |= self.is_boundary[k, b]
-        self.has_manifold[k] |= moving
-        self.free_joints[k] |= joints & moving[:, None]
-        # `near` itself comes first; else the posture of a self-motion that is closest to it, the most exact of others
-        motion = np.abs(newton.difference(arm, q[k], near[k][:, None])).sum(axis=2)
-        cost = np.where(moving[:, None], np.where(on_motion, motion, np.inf), np.where(group, size, np.inf))
-        pick = cost.argmin(axis=1)
-        leads_own = np.flatnonzero(label[k, b] == OWN_LABEL)
-        pick[leads_own] = b[leads_own]
-        self.chosen[k, pick] = unlisted
-        self.chosen_joints[k, pick] = joints & moving[:, None]
-        for array in (self.known, self.on_manifold, self.component_row, self.ended, self.uncrossed):
-            array[k, pick] = array[k, b]
-        if len(leads_own):  # named like the candidate of its group that is closest to it
-            motion = np.where(group[leads_own] & (label[k[leads_own]] != OWN_LABEL), motion[leads_own], np.inf)
-            twin_label = label[k[leads_own], motion.argmin(axis=1)]
-            label[k[leads_own], b[leads_own]] = np.where(np.isinf(motion.min(axis=1)), OWN_LABEL, twin_label)
-
-    def _on_motion(self, k: Int, b: Int, offset: Array, group: Bool) -> Bool:
-        """Which candidates (m, M) lie on the self-motions of those that lead, besides those `group` with them (m, M).
-
-        A candidate is on one if it differs in the joints that move alone. Where the residual grows along a self-motion
-        its points are not equal, and the exact ones are listed.
-        """
-        arm, task, target, _ = self.goals
-        q, joints = self.candidates.q, self.moving_joints[k, b]
-        held_offset = np.where(joints[:, None], 0.0, offset).max(axis=2)
-        moving = self.on_manifold[k, b] & ~self.ended[k, b]  # all that is on other components is one with them
-        # two postures of one self-motion may each be off by as much as a double root
-        shared: Bool = moving[:, None] & (held_offset < 3 * tol.STILL_TURN) & (self.lost.sigma[k] < tol.SOLUTION)
-        shared &= self.ungrouped[k]
-        unsure = shared & ~group & (joints.sum(axis=1) > 2)[:, None]
-        rows = np.flatnonzero(unsure.any(axis=1))
-        if len(rows):
-            leaders, goal = q[k[rows], b[rows]], target[k[rows]]
-            shared[rows] &= curves.share_circuit(arm, task, leaders, joints[rows], q[k[rows]], unsure[rows], goal)
-            # another curve crosses
-            i, c = np.nonzero(unsure & shared & (self.resting[k] & joints[:, None]).any(axis=2))
-            self._push(k[i], c)
-            rests = self.resting[k[i], c] & ~self.moving_joints[k[i], c]
-            shared[i, c] &= ~(self.on_manifold[k[i], c] & (joints[i] & rests).any(axis=1))
-        return np.asarray(shared)
-
-    def _drop_repeated(self, rows: Int) -> None:
-        """Drop what the listed self-motions of targets rows have on them besides their own posture."""
-        goals, q, ended = self.goals.of(rows), self.candidates.q[rows], self.ended[rows]
-        chosen, curve = self.chosen[rows], self.chosen_joints[rows]
-        self_motions.drop_contained(goals, q, self.lost.sigma[rows], self.resting[rows], chosen, curve)
-        # where two directions are lost several manifolds may have a posture
-        linked = (self.known & self.on_manifold)[rows, :, None] & (~ended & (self.lost.nullity[rows] < 2))[:, None]
-        linked &= self.components[self.component_row[rows]]
-        self_motions.drop_twins(goals, q, chosen, curve, ended, linked, self.tube[rows])
-        self.chosen[rows] = chosen
-
-    def settle(self, missed: Bool, all_beyond: Bool) -> Examined:
-        """Tell components, group candidates that are one, drop what self-motions contain. Of targets (K,), missed: a
-        loose candidate came to nothing; all_beyond: all candidates that are near lie beyond a fold."""
-        is_few = self.valid.shape[1] <= FEW_CANDIDATES
-        # candidates that lose several directions are followed once they lead; among many, those that lose one, too
-        unfollowed = ~self.followed & (self.lost.nullity < 2)
-        if unfollowed.any() and (is_few or unfollowed.sum() <= AT_ONCE):
-            self._follow(*np.nonzero(unfollowed))
-        if is_few:
-            # eight candidates of one target one by one take five times as long
-            unpushed = self.ungrouped & self.followed & ~self.pushed
-            if 0 < unpushed.sum() <= AT_ONCE:
-                self._push(*np.nonzero(unpushed))
-            resting = self.ungrouped & self.near_singular & self.pushed & ~self.known & ~self.on_manifold
-            if resting.any():
-                self._compare(*np.nonzero(resting))
-            self._group_plain()
-        while self.ungrouped.any():
-            k = np.flatnonzero(self.ungrouped.any(axis=1))
-            self._group(k, np.where(self.ungrouped[k], self.rank[k], np.inf).argmin(axis=1))
-        moving = np.asarray(self.chosen_joints.any(axis=2))
-        # a root of high order may also lie beside a self-motion
-        has_root_beside = (self.chosen & (self.lost.sigma < tol.HIGH_ORDER) & ~moving).any(axis=1) & moving.any(axis=1)
-        rows = np.flatnonzero((self.chosen_joints & ~self.candidates.sure).any(axis=(1, 2)) | has_root_beside)
-        if len(rows):
-            self._drop_repeated(rows)
-        (arm, task, target, _), q, chosen = self.goals, self.candidates.q, self.chosen
-        order = np.argsort(~chosen, axis=1, kind="stable")[:, : max(int(chosen.sum(axis=1).max(initial=0)), 1)]
-        every = np.arange(len(q))[:, None]
-        present = chosen[every, order]
-        status = np.where(present.any(axis=1), Status.EXACT, Status.UNREACHABLE).astype(np.int8)
-        status[self.has_boundary] = Status.BOUNDARY
-        status[self.has_manifold] = Status.SINGULAR
-        surface, (k, b) = np.zeros(len(q), bool), np.nonzero(chosen & (self.lost.nullity > 1) & moving)
-        if len(k):
-            lost = self.lost.V[k, b], self.lost.nullity[k, b]
-            surface[k[self_motions.on_surface(arm, task, q[k, b], *lost, target[k])[0]]] = True
-        listed = np.where(present[:, :, None], q[every, order], np.nan)
-        label = np.where(present, self.candidates.label[every, order], OWN_LABEL)
-        moved = np.asarray((self.chosen_joints & ~self.uncrossed[:, :, None]).any(axis=1))
-        return Examined(listed, present, label, status, self.free_joints, missed, surface, moved, all_beyond)
-
-
-def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
-    """Candidates moved onto their targets, those that miss by less than `seed_limit`, and grouped."""
-    arm, task, target, near = goals
-    K, _, n = seeds.q.shape
-    present, every = ~np.isnan(seeds.q).any(axis=2), np.arange(K)[:, None]
-    order = np.argsort(~present, axis=1, kind="stable")[:, : int(present.sum(axis=1).max(initial=0))]
-    q = np.concatenate([near[:, None], seeds.q[every, order]], axis=1)
-    label = np.concatenate([np.full((K, 1), OWN_LABEL), seeds.label[every, order]], axis=1)
-    sure = np.concatenate([np.zeros((K, 1, n), bool), seeds.sure[every, order]], axis=1)
-    loose = (seeds.loose & present)[every, order]
-    simple = np.concatenate([np.zeros((K, 1), bool), (seeds.simple & present)[every, order]], axis=1)
-    flat, goal = q.reshape(-1, n).copy(), np.repeat(np.arange(K), q.shape[1])
-    size, rows = np.where(np.isnan(flat[:, 0]), np.inf, 0.0), np.flatnonzero(~(np.isnan(flat[:, 0]) | simple.ravel()))
-    size[rows] = newton.misses(arm, task, flat[rows], target[goal[rows]])
-    out_of_reach, is_near = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
-    inexact = np.flatnonzero(~(is_near | sure.reshape(-1, n).any(axis=1) | (size < tol.ROUNDING_RESIDUAL)))
-    if len(inexact):
-        rows = inexact[size[inexact] < seed_limit]
-        unsolved = rows[size[rows] > tol.SOLUTION]
-        out_of_reach[unsolved] = high_order_roots.beyond_folds(arm, task, flat[unsolved], target[goal[unsolved]])
-        rows = rows[~out_of_reach[rows]]
-        # towards a root of third order each step goes a third of the way
-        flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)
-    q, size, is_beyond = flat.reshape(K, -1, n), size.reshape(K, -1), out_of_reach.reshape(K, -1)
-    # `near` is a candidate as it is, where it solves the target; where it stands for a self-motion already it is none
-    stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)
-    q[stands | (size[:, 0] > tol.SOLUTION), 0], size[stands, 0] = np.nan, np.inf
-    missed = (loose & (size[:, 1:] > tol.SOLUTION)).any(axis=1) | (seeds.loose & ~present).any(axis=1)
-    is_useless = is_beyond | (size > seed_limit) | np.isnan(q[..., 0])
-    all_beyond = is_beyond.any(axis=1) & is_useless[:, 1:].all(axis=1)
-    rests: Bool = np.zeros(size.shape, bool)
-    lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
-    if (lost.nullity[:, 1:] > 1).any():
-        q, label, size, rests = meetings.separate(goals, q, label, size, lost)
-        if q.shape[1] > sure.shape[1]:
-            sure, simple = (widen_columns(array, q.shape[1]) for array in (sure, simple))
-            lost = newton.lost_directions(arm, task, q, (size <= tol.SOLUTION) & ~(sure.any(axis=2) | simple), target)
-    candidates = _Candidates(q, label, size, sure, simple)
-    return _Groups(goals, candidates, lost, rests).settle(np.asarray(missed), np.asarray(all_beyond))

@@ -14,7 +14,7 @@ from armkin.inverse.answers.solutions import Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular import components, surfaces
+from armkin.inverse.singular import groups, surfaces
 from armkin.inverse.singular.curves import Curves
 from armkin.inverse.tasks.task import Task
 from armkin.keep_out.clearance import hits_nothing
@@ -45,7 +45,7 @@ def with_legal_postures(goals: Goals, batch: Batch, rows: Int) -> Batch:
             continue
         subset = Goals(arm, task, target[k : k + 1], legal[None])
         label = batch.branch[k, batch.valid[k]].astype(np.int64)
-        decision = surfaces.list_swept(subset, components.examine(subset, Seeds.of(q[None], label), surfaces.no_more))
+        decision = surfaces.list_swept(subset, groups.examine(subset, Seeds.of(q[None], label), surfaces.no_more))
         _, inside = nearest_row(arm, np.nan_to_num(decision.q[0]), near[k])
         if not (inside & decision.valid[0]).any():
             continue

@@ -2,7 +2,7 @@
 
 Two joints about one line (a straight wrist, a wrist over the shoulder) move at the same pace, so the tool's pose is a
 trigonometric polynomial of second degree in the way: it keeps its target everywhere if it does at five places. Four
-bars move as `closed.four_bars` says. One posture of each goes to `singular.components`, with what else these targets
+bars move as `closed.four_bars` says. One posture of each goes to `singular.groups`, with what else these targets
 have; what is closer, or loses more than one direction, goes there as it is.
 """
 

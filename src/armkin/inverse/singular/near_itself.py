@@ -15,7 +15,7 @@ from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.high_order_roots import BESIDE_SHARE
 from armkin.inverse.singular.self_motions import pull_back
-from armkin.inverse.tasks.task import Task
+from armkin.inverse.tasks.task import Task, targets_at
 from armkin.model import limits
 from armkin.model.arm import Arm
 from armkin.model.units import radian_or_reach
@@ -26,29 +26,11 @@ COARSE_ROOM = 1e4 * ROOM  # distance [reaches] from a pose rounded to six digits
 ROUNDED = 1.001 * tol.SOLUTION  # residual, at least, that solves a rounded target
 
 
-def at_tip(
-    arm: Arm, task: Task, target: Array, tip: Array, first: Array | None = None, room: Array | None = None
-) -> Int:
-    """Which targets (N, m) or (N, 4, 4) are where the tool is at `near`.
-
-    tip: (3,) or (N, 3), its `position`; first: (N,) the targets' first coordinate, where it stands alone; room: (N,)
-    how far off they may be [reaches], by default `ROOM`.
-    """
-    point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
-    limit = ROOM * arm.reach if room is None else room * arm.reach
-    x = point[:, 0] if first is None else first
-    rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= limit)  # one coordinate tells nearly all others
-    if len(rows):
-        distance = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
-        rows = rows[distance.max(axis=1) <= (limit if isinstance(limit, float) else limit[rows])]
-    return rows
-
-
 def put_near(goals: Goals, batch: Batch, rows: Int) -> Int:
     """Put `near` in place of the branch that it is one with; returns the targets that have to be examined.
 
-    goals, batch: N targets and their branches; rows: those of `at_tip`. Two are one if the posture between them solves
-    the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
+    goals, batch: N targets and their branches; rows: those where the tool is. Two are one if the posture between them
+    solves the target, too. Where there is no such branch, or another one close by, `near` still solves the target.
     """
     unsure = [_put_near_in_chunk(goals, batch, rows[start : start + AT_ONCE]) for start in range(0, len(rows), AT_ONCE)]
     return np.concatenate(unsure) if unsure else rows
@@ -89,7 +71,7 @@ def solved_by_near(arm: Arm, task: Task, target: Array, near: Array, bounds: Arr
     if not is_rounded.any():
         return np.flatnonzero(is_rounded)
     nears = np.broadcast_to(near, (len(target), arm.n))
-    rows = at_tip(arm, task, target, position(arm, near), room=np.where(is_rounded, bounds, -1.0))
+    rows = targets_at(task, target, position(arm, near), np.where(is_rounded, bounds, -1.0) * arm.reach)
     rows = rows[~limits.outside_limits(arm, nears[rows]).any(axis=1)]
     return np.asarray(rows[newton.misses(arm, task, nears[rows], target[rows]) <= bounds[rows]])
 

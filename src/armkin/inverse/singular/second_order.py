@@ -31,7 +31,7 @@ class Series(NamedTuple):
 
     @classmethod
     def at(cls, arm: Arm, task: Task, q: Array, target: Array, linear: newton.Linear) -> Self:
-        """By differences close by: x keeps what the other directions reach to second order."""
+        """The series at postures q (M, n), by differences: x keeps what other directions reach to second order."""
         S, V = linear.S, linear.V
         both_ways = BOTH_SENSES * tol.FOLD_WAY * V[:, -1]
         second_derivative = _moved_pose(arm, task, q, both_ways, target, linear).sum(axis=0) / tol.FOLD_WAY**2

@@ -1,7 +1,7 @@
 """Self-motions: whether the joints can move while the target is kept, and which postures lie on one.
 
 A posture is pushed along each direction that its Jacobian loses, and pulled back onto the target. What then lies on
-a self-motion that is listed already is dropped: `armkin.inverse.singular.components` lists one posture of each.
+a self-motion that is listed already is dropped: `armkin.inverse.singular.groups` lists one posture of each.
 """
 
 import itertools

@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.answers.batch import OWN_LABEL, Examined, Goals, Seeds
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.singular.components import examine
+from armkin.inverse.singular.groups import examine
 from armkin.model.arm import Arm
 from armkin.model.lock_joints import lock
 

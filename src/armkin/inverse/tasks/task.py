@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from armkin.errors import UsageError
 from armkin.formula import arrays, pose
-from armkin.formula.arrays import Array, Entry
+from armkin.formula.arrays import Array, Entry, Int
 from armkin.formula.trace import StraightLineCode
 from armkin.model.arm import Arm
 
@@ -199,6 +199,21 @@ def targets_around(arm: Arm, task: Task, target: Array, pairs: int = 2, size: fl
     """Targets (M, m) or (M, 4, 4) moved by up to size [reaches, rad], in opposite pairs: (M, 2 pairs, ...)."""
     moves = np.random.default_rng(3).uniform(-size, size, (pairs, 6))
     return np.stack([shifted_targets(arm, task, target, sign * d) for d in moves for sign in (1.0, -1.0)], axis=1)
+
+
+def targets_at(task: Task, target: Array, tip: Array, room: float | Array, first: Array | None = None) -> Int:
+    """Which targets (N, m) or (N, 4, 4) are at positions of the tool.
+
+    tip: (3,) or (N, 3) [mm]; room: how far off they may be [mm], a number or (N,); first: (N,) the targets' first
+    coordinate, where it stands alone.
+    """
+    point = target[:, :3, 3] if task.orientation == "full" else target[:, : task.position]
+    x = point[:, 0] if first is None else first
+    rows = np.flatnonzero(np.abs(x - tip[..., 0]) <= room)  # one coordinate tells nearly all others
+    if len(rows):
+        offset = np.abs(point[rows] - (tip if tip.ndim == 1 else tip[rows])[..., : task.position])
+        rows = rows[offset.max(axis=1) <= (room if isinstance(room, float) else room[rows])]
+    return rows
 
 
 def distance(arm: Arm, task: Task, target: Array) -> Array:
