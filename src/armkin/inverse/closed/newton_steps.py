@@ -47,7 +47,7 @@ class NewtonSteps:
         self.follow: list[list[float]] = follow.tolist()  # derivatives of the last joints by the first ones
         error = min(SLOPE * distance, 0.5)  # each step squares the error
         least = max(math.ceil(math.log2(math.log(tol.LAST_ERROR) / math.log(error))), 1)
-        # one step more leaves two thirds fewer of a calibrated SCARA's targets near folds to `solvers.pairs`
+        # with one step more two thirds of the targets near a singularity need no other way
         self.steps = min(least + 1, MAX_STEPS)
         self.counted = task.name == "xyz" and not arm.prismatic.any()
         # seeds with a larger squared residual need not converge; a slide's error grows with its extension

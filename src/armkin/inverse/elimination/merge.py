@@ -85,7 +85,7 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         _, middle_error = pose_error(tip(chain, prismatic, (q[first] + step / 2).T)[0], target)
         blur = np.maximum(tol.HALFWAY_RESIDUAL, 4 * np.maximum(residual[first], residual[second]))
         # An answer may be off by a Newton step, at most weakness * residual, along a curve of answers that all but
-        # solve its pose: two on both sides of one answer are two such steps apart, and a third step is the margin.
+        # solve its pose: two on both sides of one answer are two such steps apart; 3 leaves room.
         radius = 3 * answers.weakness * residual
         reach = np.maximum(radius[first], radius[second])
         equal = (distance < np.maximum(tol.SAME_ANSWER, reach)) | (middle_error < blur)
