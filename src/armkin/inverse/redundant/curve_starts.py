@@ -124,6 +124,7 @@ def _answers_between(source: Follower, t: Array, defect: Array) -> tuple[Int, Ar
 
 def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     """Which postures (M, n) of groups (M,) are the first of those that are the same."""
+    # cos is even: without a shift q and -q would share a key; joints differ in weight so that angles do not swap unseen
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
     order = np.lexsort((key, group))
     first, second = order[:-1], order[1:]

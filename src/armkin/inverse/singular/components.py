@@ -46,8 +46,8 @@ class Components:
         self.rank[:, 0] = 0.0
         self.near_singular: Bool = (lost.place >= 0) & (lost.sigma < tol.FOLD_VALUE) & ~on_motion
         lost.sigma[on_motion] = 0.0
-        self.followed: Bool = ~(self.valid & ~simple & self.near_singular)  # whether that is done, or needless
-        self.pushed = self.followed.copy()  # likewise
+        self.followed: Bool = ~(self.valid & ~simple & self.near_singular)  # whether `follow` is done or needless
+        self.pushed = self.followed.copy()  # whether `push` is done or needless
         self.known = on_motion.copy()  # whether its component is known
         self.on_manifold = on_motion.copy()  # whether that is a self-motion manifold
         self.moving_joints = candidates.sure.copy()  # those that move along the manifold

@@ -89,9 +89,11 @@ def decide(arm: Arm, task: Task, q: Array, target: Array, linear: newton.Linear,
         cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
         quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + arm.n * h * offset
         change = (6.0 * cubic + 12.0 * quartic) / h**2  # of g'', at most
+        # up to a change of 0.27 b |g| passes `SOLUTION` on both sides within h: 0.2 leaves room
         turns = has_turn & (change < 0.2 * bend) & series.turns(change)
         passes = ~has_turn & (sigma**2 > 2.0 * tol.SOLUTION * (bend + change))
         chord_error = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(correction, axis=2).max(axis=0) + offset
+        # a curve that leaves its tangent by a tenth of h or more is left to the polynomials of `local_structure`
         newly = undecided & (turns | passes) & (chord_error < 0.1 * h)
         decided, boundary = decided | newly, boundary | (newly & turns)
         undecided &= ~newly & (offset < 0.5 * last_offset)  # the next step must come closer to tell more

@@ -99,5 +99,6 @@ def _refine_time(part: Cut, number: int, guess: float, counts: np.ndarray) -> fl
         speed = stretch.evaluate(times, 1)[0] @ arm.motor_gain.T
         if speed @ speed < 1.0:  # slower than a step a second counts as rest
             break
+        # A step of at most 0.02 s: twice the first one, 9.8 ms, of the 79 guesses that the tests of a held motion make.
         t = float(np.clip(t + np.clip(distance @ speed / (speed @ speed), -0.02, 0.02), 0.0, stretch.duration))
     return t
