@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import chain, islice
 from typing import TYPE_CHECKING
 
-from armkin.board.firmware.segments.remaining_plan import left_of
+from armkin.board.firmware.segments.remaining_plan import remaining_plans
 from armkin.board.firmware.streaming import MAX_LEAD, NOISY_LEAD, motion_batches, ramp_pieces, seconds_of, stream_frames
 from armkin.board.firmware.wire import protocol
 from armkin.board.firmware.wire.motion_frame import MotionFrame
@@ -60,7 +60,7 @@ class _UnderWay:
         if not all(status.known >> axis & 1 for axis in axes) or (frames == 0 and not first):
             return None
         plans = [plan, *(plan for *_, plan, move_number in islice(self._moves, 1, None) if move_number == 0)]
-        remaining = left_of(plans, number, [status.counts[axis] for axis in axes], plan_trajectory)
+        remaining = remaining_plans(plans, number, [status.counts[axis] for axis in axes], plan_trajectory)
         stop_time = session.deaf + session.port.now() - start_time
         if remaining is None or remaining[1].seconds > _BEGINNING_TIME or stop_time > _STAND_TIME:
             return None

@@ -39,7 +39,7 @@ def remaining_trajectory(part: Cut, place: PlanPlace, present: Array) -> Traject
     return Trajectory(arm, present, (first_remainder, *stretches[place.stretch + 1 :]))
 
 
-def left_of(
+def remaining_plans(
     plans: Sequence[Cut], move: int, counts: Sequence[int], plan_trajectory: Callable[[Trajectory, np.ndarray], Cut]
 ) -> tuple[Sequence[Cut], PlanPlace] | None:
     """The remainder of plans for an arm at rest on a move of the first one, and its place on that move.
