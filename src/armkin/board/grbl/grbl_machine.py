@@ -129,7 +129,7 @@ class GrblMachine(StepperArm):
 
         def tick() -> bool:
             report(self.port.now() - start_time)
-            watch.heed(self.session.fresh_report(), self.port.now() - start_time)
+            watch.check_report(self.session.fresh_report(), self.port.now() - start_time)
             return self._stop()
 
         # GRBL answers the dwell after all earlier lines have been carried out

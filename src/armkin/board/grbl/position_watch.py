@@ -37,12 +37,12 @@ class Watch:
         self._axes, self._offset = axes, offset
         self._times, self._points = _path_samples(job)
         self._points_passed = 0  # points that the arm has passed
-        self._doubts = 0
+        self._suspect_reports = 0  # consecutive reports with a fault
         self._plan_time = 0.0  # [s] progress in the plan
         self._progress_time = 0.0  # [s] since the start, at that report
         self._pause = 0.0  # [s] planned pause there
 
-    def heed(self, report: Report | None, elapsed: float) -> None:
+    def check_report(self, report: Report | None, elapsed: float) -> None:
         """Raise LinkError if a report, if any, shows a damaged line or another program."""
         if report is not None and report.feed is not None and report.feed > 100:
             raise LinkError(f"another program has set feeds to {report.feed} %")
@@ -62,8 +62,8 @@ class Watch:
         fault_text = "it has left its path" if plan_times is None else None
         if plan_times is not None and plan_times[0] > elapsed + LEAD_TIME:
             fault_text = "it is faster than planned"
-        self._doubts = self._doubts + 1 if fault_text else 0
-        if self._doubts >= 2:  # twice, as reports have no checksum
+        self._suspect_reports = self._suspect_reports + 1 if fault_text else 0
+        if self._suspect_reports >= 2:  # twice, as reports have no checksum
             return fault_text
         return (
             None
