@@ -30,7 +30,7 @@ _MAX_BYTES = 65_536  # size [bytes], at most, of a note
 
 
 @dataclass(frozen=True)
-class Note:
+class MotionNote:
     """A motion that is in progress or held."""
 
     robot: str  # the robot file's SHA-256
@@ -50,19 +50,22 @@ def plan_digest(parts: Sequence[Cut]) -> str:
     return hasher.hexdigest()
 
 
-class Trip:
+class MotionNoteWriter:
     """Writes the note of a motion while it is carried out, and deletes it on arrival.
 
     started: the note of the motion that is resumed, and the seconds of it that were done.
     """
 
     def __init__(
-        self, machine: FirmwareMachine, parts: Sequence[Cut], begun_note: tuple[Note, float] | None = None
+        self, machine: FirmwareMachine, parts: Sequence[Cut], begun_note: tuple[MotionNote, float] | None = None
     ) -> None:
         self._machine, self._file = machine, note_path(machine.port.name)
         self._keeps_note = not machine.port.simulated
         start = parts[0].start.tolist() if parts else list(machine.counts())
-        self._note, self._seconds_before = begun_note or (Note(machine.arm.sha256, plan_digest(parts), start, 0.0), 0.0)
+        self._note, self._seconds_before = begun_note or (
+            MotionNote(machine.arm.sha256, plan_digest(parts), start, 0.0),
+            0.0,
+        )
         self._note = replace(self._note, seconds=self._seconds_before, stands=None)
 
     def __enter__(self) -> Self:
@@ -95,7 +98,7 @@ class Trip:
 
 @contextmanager
 def under_way(
-    machine: FirmwareMachine, cuts: Sequence[Cut], note: Note | None
+    machine: FirmwareMachine, cuts: Sequence[Cut], note: MotionNote | None
 ) -> Iterator[tuple[Sequence[Cut], int, Callable[[float], None]]]:
     """The parts to carry out, the number of the first of them, and a function that takes the seconds done.
 
@@ -104,11 +107,11 @@ def under_way(
     place = None if note is None else find_place(machine, note, cuts)
     remaining = cuts if place is None else remaining_parts(machine, cuts, place)
     begun_note = None if note is None or place is None else (note, place.elapsed)
-    with Trip(machine, cuts, begun_note) as trip:
-        yield remaining, 0 if place is None else place.part, trip.progress
+    with MotionNoteWriter(machine, cuts, begun_note) as writer:
+        yield remaining, 0 if place is None else place.part, writer.progress
 
 
-def recall_note(machine: FirmwareMachine) -> Note:
+def recall_note(machine: FirmwareMachine) -> MotionNote:
     """The note of the motion that was held on this machine.
 
     Raises NothingHeldError if there is none, or it is of another robot file; LinkError if the arm has moved since.
@@ -127,7 +130,7 @@ def recall_note(machine: FirmwareMachine) -> Note:
     return note
 
 
-def find_place(machine: FirmwareMachine, note: Note, parts: Sequence[Cut]) -> PlanPlace:
+def find_place(machine: FirmwareMachine, note: MotionNote, parts: Sequence[Cut]) -> PlanPlace:
     """The arm's place on the plan, which was computed again.
 
     Raises NothingHeldError if it is another plan, LinkError if the arm does not stand on it.
@@ -151,7 +154,7 @@ def remaining_parts(machine: FirmwareMachine, parts: Sequence[Cut], place: PlanP
     return [machine.plan_trajectory(trajectory, counts), *parts[place.part + 1 :]]
 
 
-def _read_held_note(path: str) -> Note | None:
+def _read_held_note(path: str) -> MotionNote | None:
     """The note in a file, or None if it is missing or not valid."""
     fields = read_note(path, _MAX_BYTES)
     if fields is None:
@@ -161,6 +164,6 @@ def _read_held_note(path: str) -> Note | None:
         counts = [start] if stands is None else [start, stands]
         if not all(type(x) is int for row in counts for x in row) or len(counts[-1]) != len(start):
             return None
-        return Note(str(fields["robot"]), str(fields["plan"]), start, float(fields["seconds"]), stands)
+        return MotionNote(str(fields["robot"]), str(fields["plan"]), start, float(fields["seconds"]), stands)
     except (ValueError, KeyError, TypeError):
         return None

@@ -131,7 +131,7 @@ class FirmwareBoard(Board):
 
     @contextmanager
     def under_way(
-        self, parts: Sequence[Planned], note: resume_after_hold.Note | None
+        self, parts: Sequence[Planned], note: resume_after_hold.MotionNote | None
     ) -> Iterator[tuple[Sequence[Planned], int, Callable[[float], None]]]:
         """The parts to be carried out or, of a resumed motion, what is left of them."""
         with resume_after_hold.under_way(
@@ -139,7 +139,7 @@ class FirmwareBoard(Board):
         ) as what_is_left:
             yield what_is_left
 
-    def recall(self) -> resume_after_hold.Note:
+    def recall(self) -> resume_after_hold.MotionNote:
         """The note of the motion that was held on this board."""
         return resume_after_hold.recall_note(self.machine)
 
