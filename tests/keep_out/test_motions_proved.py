@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.keep_out.body_pairs import guard
-from armkin.keep_out.displacement_bounds import levers
+from armkin.keep_out.displacement_bounds import approach_rates
 from armkin.keep_out.motion_geometry import Cubics
 from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm
@@ -83,13 +83,13 @@ def test_a_body_moves_no_farther_than_its_levers(ratio: float, table: Path) -> N
         q = _random_postures(arm, 2000, 6)
         step = rng.normal(size=q.shape) * np.where(arm.prismatic, 1.0, 0.01)
         moved = np.abs(held.distances(q + step) - held.distances(q))
-        bound = np.abs(step) @ levers(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
+        bound = np.abs(step) @ approach_rates(held, np.where(arm.prismatic, np.abs(q).max(axis=0) + 5.0, 0.0))
         assert (moved <= bound + 1e-9).all()
         assert (moved.max(axis=0) > 0.2 * bound.max(axis=0)).any()  # and the bound is no guess in the sky
         travel = np.where(arm.prismatic, np.abs(q).max(axis=0), 0.0)
         last = [k for k, pair in enumerate(held.pairs) if pair.body == arm.n and not pair.other]
         tip = armkin.fk(arm, q)[:, :2, 3]  # axis 1 stands upright in the base's origin
-        assert (levers(held, travel)[0, last] >= ratio * np.hypot(*tip.T).max()).all()
+        assert (approach_rates(held, travel)[0, last] >= ratio * np.hypot(*tip.T).max()).all()
 
 
 def test_parts_of_cubics_go_no_farther_than_told() -> None:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from armkin.keep_out.body_pairs import Guard
 
 
-def levers(guard: Guard, slide_out: Array) -> Array:
+def approach_rates(guard: Guard, slide_out: Array) -> Array:
     """The greatest approach of the bodies of every pair for a unit of each joint: (n, pairs) [mm/rad, mm/mm].
 
     slide_out: (n,) [mm] greatest extension of each prismatic joint during the motion. Relative to the earlier body (for

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.formula.arrays import Array
-from armkin.keep_out.displacement_bounds import levers
+from armkin.keep_out.displacement_bounds import approach_rates
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -64,13 +64,13 @@ def prove_motion(
     places = np.unique(np.round(np.linspace(0.0, motion.cells, min(motion.cells, _FIRST) + 1)))
     q = motion.joints_at(places)
     slide_out = np.abs(q).max(axis=0) + motion.variation(np.zeros(1), np.array([float(motion.cells)]))[0]
-    lever = levers(guard, slide_out)
+    rates = approach_rates(guard, slide_out)
     clearances = guard.clearances(q)
     overlaps_at_start = clearances[0] < 0.0
     if ignored_pairs is not None:
         overlaps_at_start = overlaps_at_start & np.isin(np.arange(len(overlaps_at_start)), ignored_pairs)
     while True:
-        refinement = _Round(places, clearances, motion.variation(places[:-1], places[1:]) @ lever, overlaps_at_start)
+        refinement = _Round(places, clearances, motion.variation(places[:-1], places[1:]) @ rates, overlaps_at_start)
         middle = refinement.to_halve(tight)
         if not len(middle):
             return refinement.result()
@@ -87,13 +87,13 @@ def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
     if not guard.pairs or not count:
         return hit
     length = np.concatenate([np.zeros((1, q.shape[1])), np.cumsum(np.abs(np.diff(q, axis=0)), axis=0)])
-    lever = levers(guard, np.abs(q).max(axis=0))
+    rates = approach_rates(guard, np.abs(q).max(axis=0))
     samples = np.arange(0, count, _STRIDES[0])
     samples = np.append(samples, count - 1) if samples[-1] < count - 1 else samples
     gaps = guard.clearances(q[samples])
     for stride in (*_STRIDES[1:], 0):
         hit[samples] = (gaps < 0).any(axis=1)
-        is_free = (gaps[:-1] + gaps[1:] >= (length[samples[1:]] - length[samples[:-1]]) @ lever).all(axis=1)
+        is_free = (gaps[:-1] + gaps[1:] >= (length[samples[1:]] - length[samples[:-1]]) @ rates).all(axis=1)
         rows = np.flatnonzero(~is_free & (np.diff(samples) > 1))
         if not stride or not len(rows):
             break
