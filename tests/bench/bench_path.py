@@ -27,7 +27,7 @@ from lines import random_line
 
 import armkin
 from armkin.inverse.tasks.choose_task import task_for
-from armkin.motion.branches.branch_chains import Chain, chains_of_columns, fewest_runs
+from armkin.motion.branches.branch_chains import BranchChain, chains_of_columns, fewest_runs
 from armkin.motion.branches.linked_branches import link_branches
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.timing.cubic_knots import Knots
@@ -100,7 +100,7 @@ def print_branches(lines: int) -> None:
         )
 
 
-def tips_off(arm: armkin.Arm, chains: list[Chain]) -> float:
+def tips_off(arm: armkin.Arm, chains: list[BranchChain]) -> float:
     """How far the tip leaves its chord at most, on twenty points of every step of all chains [mm]."""
     worst, f = 0.0, np.linspace(0, 1, 20)[:, None]
     for chain in chains:

@@ -13,7 +13,7 @@ import armkin
 from armkin.errors import NoSolutionError
 from armkin.model.arm import Arm
 from armkin.motion.branches import boundary_chains
-from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_chains import BranchChain
 from armkin.motion.branches.branch_columns import Samples
 
 
@@ -73,7 +73,7 @@ def test_many_boundaries_in_a_row_do_not_multiply_the_chains(monkeypatch: pytest
     joined = boundary_chains._join_chains
     count = 0
 
-    def count_and_call(a: Chain, b: Chain) -> Chain:
+    def count_and_call(a: BranchChain, b: BranchChain) -> BranchChain:
         nonlocal count
         count += 1
         assert count <= 100

@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.inverse.answers.solutions import Status
-from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_chains import BranchChain
 from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import chord_bound, joint_change, levers, whole_turns
 from armkin.motion.branches.linked_branches import END_ACCURACY
@@ -30,8 +30,8 @@ _MAX_CHAINS = 64  # every boundary may multiply the chains; those through the mo
 
 
 def add_boundary_chains(
-    arm: Arm, columns: BranchColumns, chains: list[Chain], fixed: Array | None, tolerance: float
-) -> list[Chain]:
+    arm: Arm, columns: BranchColumns, chains: list[BranchChain], fixed: Array | None, tolerance: float
+) -> list[BranchChain]:
     """The chains and those joined from them at boundaries; fixed: (n,) the posture at the start, or None."""
     s, last = columns.s, len(columns.s) - 1
     result = chains = _bridge_pairs(s, chains, tolerance)
@@ -54,7 +54,7 @@ def add_boundary_chains(
     )
 
 
-def _boundary_samples(columns: BranchColumns, chains: list[Chain]) -> list[int]:
+def _boundary_samples(columns: BranchColumns, chains: list[BranchChain]) -> list[int]:
     """The inner samples on a boundary near which a chain ends; an empty list if there are too many."""
     ends = np.unique([sample for chain in chains for sample in (chain.first, chain.last)])
     boundary_rows = np.flatnonzero(columns.status[1:-1] == Status.BOUNDARY) + 1
@@ -66,12 +66,12 @@ def _boundary_samples(columns: BranchColumns, chains: list[Chain]) -> list[int]:
     return near_ends if len(near_ends) <= _MAX_BOUNDARIES else []
 
 
-def _add_new_chains(chains: list[Chain], new_chains: list[Chain]) -> list[Chain]:
+def _add_new_chains(chains: list[BranchChain], new_chains: list[BranchChain]) -> list[BranchChain]:
     """The chains, and those of `new_chains` that are not among them."""
     return chains + [chain for chain in new_chains if chain not in chains]
 
 
-def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain]:
+def _bridge_pairs(s: Array, chains: list[BranchChain], tolerance: float) -> list[BranchChain]:
     """The chains and, for each pair that a straight wrist has cut in two, their union.
 
     Joints 4 and 6 are undetermined exactly where the wrist is straight: the first chain ends a few micrometres before
@@ -89,15 +89,17 @@ def _bridge_pairs(s: Array, chains: list[Chain], tolerance: float) -> list[Chain
             share = (s[a.last + 1 : b.first + 1] - s[a.last]) / (s[b.first] - s[a.last])
             q_between = a.q[-1] + share[:, None] * step
             labels = np.concatenate([a.labels, np.repeat(b.labels[:1], len(share))])
-            result.append(_join_chains(Chain(a.arm, a.first, np.concatenate([a.q, q_between]), labels), b))
+            result.append(_join_chains(BranchChain(a.arm, a.first, np.concatenate([a.q, q_between]), labels), b))
     return result
 
 
-def _chains_to(s: Array, chain: Chain, end: int, postures: Array, tolerance: float) -> list[Chain]:
+def _chains_to(s: Array, chain: BranchChain, end: int, postures: Array, tolerance: float) -> list[BranchChain]:
     """A chain up to sample `end`: its part up to there, or its extensions to each of the postures there."""
     if chain.first < end <= chain.last:
         size = end + 1 - chain.first
-        return [chain] if chain.last == end else [Chain(chain.arm, chain.first, chain.q[:size], chain.labels[:size])]
+        return (
+            [chain] if chain.last == end else [BranchChain(chain.arm, chain.first, chain.q[:size], chain.labels[:size])]
+        )
     gap = s[end] - s[chain.last]
     if chain.last > end or gap > _END_DISTANCE:
         return []
@@ -107,11 +109,11 @@ def _chains_to(s: Array, chain: Chain, end: int, postures: Array, tolerance: flo
     for step in _certified_steps(chain, chain.q[-1], postures, tolerance):
         labels = np.concatenate([chain.labels, np.repeat(chain.labels[-1:], end - chain.last)])
         q = np.concatenate([chain.q, chain.q[-1] + share[:, None] * step])
-        extended.append(Chain(chain.arm, chain.first, q, labels))
+        extended.append(BranchChain(chain.arm, chain.first, q, labels))
     return extended
 
 
-def _chains_from(s: Array, chain: Chain, start: int, postures: Array, tolerance: float) -> list[Chain]:
+def _chains_from(s: Array, chain: BranchChain, start: int, postures: Array, tolerance: float) -> list[BranchChain]:
     """A chain from sample `start` on, found as the end of the reversed chain."""
     if chain.first == start < chain.last:
         return [chain]
@@ -120,27 +122,29 @@ def _chains_from(s: Array, chain: Chain, start: int, postures: Array, tolerance:
     return [_reverse_chain(reverse, N) for reverse in extended]
 
 
-def _reverse_chain(chain: Chain, N: int) -> Chain:
+def _reverse_chain(chain: BranchChain, N: int) -> BranchChain:
     """The chain in the opposite direction of travel; N: the number of samples of the route."""
-    return Chain(chain.arm, N - 1 - chain.last, chain.q[::-1], chain.labels[::-1])
+    return BranchChain(chain.arm, N - 1 - chain.last, chain.q[::-1], chain.labels[::-1])
 
 
-def _certified_steps(chain: Chain, q: Array, postures: Array, tolerance: float) -> list[Array]:
+def _certified_steps(chain: BranchChain, q: Array, postures: Array, tolerance: float) -> list[Array]:
     """Joint steps (n,) from q to those postures that are certified to be on the same branch."""
     lever = levers(chain.arm)
     steps = [joint_change(chain.arm, q, posture) for posture in postures]
     return [step for step in steps if float(chord_bound(lever, step)) <= tolerance]
 
 
-def _are_consecutive(a: Chain, b: Chain) -> bool:
+def _are_consecutive(a: BranchChain, b: BranchChain) -> bool:
     """Whether a chain begins where another ends, and is not its own continuation."""
     step = joint_change(a.arm, a.q[-1], b.q[0])
     same_chain = np.shares_memory(a.q, b.q)  # views of the same array
     return not same_chain and float(np.abs(step).max()) < _SAME_POSTURE
 
 
-def _join_chains(a: Chain, b: Chain) -> Chain:
+def _join_chains(a: BranchChain, b: BranchChain) -> BranchChain:
     """Chain a followed by chain b, which begins at the last sample of a."""
     turns = np.where(a.arm.prismatic, 0.0, whole_turns(a.arm))
     offset = turns * np.rint((a.q[-1] - b.q[0]) / whole_turns(a.arm))
-    return Chain(a.arm, a.first, np.concatenate([a.q, b.q[1:] + offset]), np.concatenate([a.labels, b.labels[1:]]))
+    return BranchChain(
+        a.arm, a.first, np.concatenate([a.q, b.q[1:] + offset]), np.concatenate([a.labels, b.labels[1:]])
+    )

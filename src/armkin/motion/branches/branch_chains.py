@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class BranchChain:
     """One branch over samples first .. first + len(q) - 1, continuous in its joint values."""
 
     arm: Arm
@@ -131,7 +131,7 @@ class Chain:
         return np.asarray(self.q[i - self.first : last - self.first + 1] + offsets)
 
 
-def chains_of_columns(arm: Arm, columns: BranchColumns) -> list[Chain]:
+def chains_of_columns(arm: Arm, columns: BranchColumns) -> list[BranchChain]:
     """All chains of linked columns."""
     N, B = columns.q.shape[:2]
     valid = columns.valid
@@ -161,13 +161,13 @@ def chains_of_columns(arm: Arm, columns: BranchColumns) -> list[Chain]:
     return [_assemble_chain(arm, columns, blocks) for blocks in ended_chains]
 
 
-def _assemble_chain(arm: Arm, columns: BranchColumns, blocks: list[tuple[int, int, int]]) -> Chain:
+def _assemble_chain(arm: Arm, columns: BranchColumns, blocks: list[tuple[int, int, int]]) -> BranchChain:
     size = blocks[-1][1] + 1 - blocks[0][0]
     # memory order joint by joint, since limits and copies are evaluated joint by joint
     parts = [columns.q[a : b + 1, column].T for a, b, column in blocks]
     q = np.concatenate(parts, axis=1, out=np.empty((arm.n, size))).T
     labels = np.concatenate([columns.name[a : b + 1, column] for a, b, column in blocks])
-    chain = Chain(arm, blocks[0][0], q, labels.astype(np.intp))
+    chain = BranchChain(arm, blocks[0][0], q, labels.astype(np.intp))
     lowest, highest = chain.extent
     for joint in np.flatnonzero(~arm.prismatic & (highest - lowest > np.pi)):  # principal values may jump by a turn
         turn = whole_turns(arm)[joint]
@@ -182,12 +182,12 @@ def _assemble_chain(arm: Arm, columns: BranchColumns, blocks: list[tuple[int, in
 class Run:
     """A stretch of the route on one chain within the limits."""
 
-    chain: Chain
+    chain: BranchChain
     first: int
     last: int
 
 
-def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None) -> list[Run]:
+def fewest_runs(chains: list[BranchChain], N: int, allowed: list[BranchChain] | None = None) -> list[Run]:
     """The fewest runs in order, each as long as any chain allows; no run covers samples that no chain carries.
 
     allowed: the chains on which the first run may begin. Among equally long runs the one with the least motion is
@@ -208,7 +208,7 @@ def fewest_runs(chains: list[Chain], N: int, allowed: list[Chain] | None = None)
     return runs
 
 
-def _possible_starts(chains: list[Chain], N: int) -> Bool:
+def _possible_starts(chains: list[BranchChain], N: int) -> Bool:
     """Whether a run may begin at each sample: (N + 1,), true for the end behind the last one."""
     alive = np.zeros(N + 1, bool)
     alive[N] = True
@@ -218,13 +218,13 @@ def _possible_starts(chains: list[Chain], N: int) -> Bool:
     return alive
 
 
-def _least_motion_run(choices: list[Chain], i: int, last_sample: int) -> Run:
+def _least_motion_run(choices: list[BranchChain], i: int, last_sample: int) -> Run:
     """The run of the chain with the least motion, of those that carry from sample i to `last_sample`."""
     chain = min((c for c in choices if c.carries_to(i) == last_sample), key=lambda c: least_time(c, i, last_sample))
     return Run(chain, i, last_sample)
 
 
-def least_time(chain: Chain, i: int, last: int) -> float:
+def least_time(chain: BranchChain, i: int, last: int) -> float:
     """A lower bound [s] of the time from sample i to `last`, from the joints' max_speed."""
     q = chain.q[i - chain.first : last - chain.first + 1]
     speed = np.where(np.isnan(chain.arm.max_speed), 1.0, chain.arm.max_speed)
@@ -243,7 +243,7 @@ class EndReason(NamedTuple):
     limit: float | None = None  # [rad | mm]
 
 
-def end_reason(columns: BranchColumns, chain: Chain, i: int) -> EndReason:
+def end_reason(columns: BranchColumns, chain: BranchChain, i: int) -> EndReason:
     """Why a run from sample i ends: a hit, a limit, the path's end, the reach, a boundary or a singularity."""
     last = chain.carries_to(i)
     next_sample = min(max(last + 1, 0), len(columns.s) - 1)

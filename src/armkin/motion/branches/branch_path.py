@@ -17,7 +17,7 @@ from armkin.formula.arrays import Array
 from armkin.forward import jacobian, position
 from armkin.inverse.branches.names import find_branches
 from armkin.motion.branches.boundary_chains import add_boundary_chains
-from armkin.motion.branches.branch_chains import Chain, Run, chains_of_columns, fewest_runs
+from armkin.motion.branches.branch_chains import BranchChain, Run, chains_of_columns, fewest_runs
 from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.branches.linked_branches import END_ACCURACY, link_branches
@@ -62,7 +62,7 @@ class CarriedRoute:
 
     route: Route
     columns: BranchColumns
-    chains: list[Chain]
+    chains: list[BranchChain]
     runs: list[Run]
 
     @property
@@ -128,16 +128,16 @@ def carry_route(
     return CarriedRoute(route, columns, all_chains, complete or fewest_runs(all_chains, end + 1, starts))
 
 
-def _start_chains(arm: Arm, chains: list[Chain], fixed: Array | None) -> list[Chain]:
+def _start_chains(arm: Arm, chains: list[BranchChain], fixed: Array | None) -> list[BranchChain]:
     """The chains that may begin a route; fixed: (n,) where the arm stands, if it has no choice."""
     starts = [chain for chain in chains if chain.first == 0]
     if fixed is None:
         return starts
     # without a branch there the start is a chain of one sample: the wrist has to turn at rest first
-    return [chain for chain in starts if starts_at(chain, fixed)] or [Chain(arm, 0, fixed[None], np.full(1, -1))]
+    return [chain for chain in starts if starts_at(chain, fixed)] or [BranchChain(arm, 0, fixed[None], np.full(1, -1))]
 
 
-def starts_at(chain: Chain, q: Array) -> bool:
+def starts_at(chain: BranchChain, q: Array) -> bool:
     """Whether a chain begins at the posture q (n,), up to whole turns."""
     return float(np.abs(joint_change(chain.arm, chain.q[0], q)).max()) < 1e-4
 

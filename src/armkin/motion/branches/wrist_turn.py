@@ -18,7 +18,7 @@ import numpy as np
 from armkin.errors import UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk, jacobian
-from armkin.motion.branches.branch_chains import Chain
+from armkin.motion.branches.branch_chains import BranchChain
 from armkin.motion.branches.branch_columns import BranchColumns
 from armkin.motion.branches.joint_steps import MIN_LEVER, joint_change
 from armkin.motion.branches.solve_on_route import correct_to_route
@@ -59,8 +59,8 @@ def check_wrist(arm: Arm) -> None:
 
 
 def add_wrist_chains(
-    arm: Arm, route: Route, columns: BranchColumns, chains: list[Chain], turn: float, tip_offset: float
-) -> list[Chain]:
+    arm: Arm, route: Route, columns: BranchColumns, chains: list[BranchChain], turn: float, tip_offset: float
+) -> list[BranchChain]:
     """The chains, and those that pass a singularity and go on with the wrist flipped.
 
     turn: [rad] by which the tool may turn aside; tip_offset: [mm] length of a detour, at most.
@@ -99,7 +99,7 @@ def _wrist_volume(arm: Arm, q: Array) -> Array:
     return np.asarray((a + c) / 2 + (a - c) / 2 * np.cos(angle) + (b - (a + c) / 2) * np.sin(angle))
 
 
-def _straight_samples(arm: Arm, chain: Chain, max_volume: float) -> list[int]:
+def _straight_samples(arm: Arm, chain: BranchChain, max_volume: float) -> list[int]:
     """Samples at which the wrist volume of a chain has a local minimum below `max_volume`."""
     volumes = np.abs(_wrist_volume(arm, chain.q))
     volumes[volumes < _ROUNDING_SHARE] = 0.0  # else rounding makes minima all along a singular route
@@ -110,7 +110,9 @@ def _straight_samples(arm: Arm, chain: Chain, max_volume: float) -> list[int]:
     return (chain.first + np.flatnonzero(is_minimum & (volumes - decrease < max_volume))).tolist()
 
 
-def _window_spans(route: Route, s: Array, chain: Chain, next_chain: Chain, j: int) -> Iterator[tuple[int, int]]:
+def _window_spans(
+    route: Route, s: Array, chain: BranchChain, next_chain: BranchChain, j: int
+) -> Iterator[tuple[int, int]]:
     """First and last samples of ever wider windows around sample j, within one piece of the route."""
     piece = int(np.searchsorted(route.breaks, s[j]))
     low, high = route.breaks[max(piece - 1, 0)], route.breaks[min(piece, len(route.breaks) - 1)]
@@ -144,8 +146,8 @@ def _widest_window(
 
 
 def _chain_through_window(
-    arm: Arm, route: Route, s: Array, chain: Chain, next_chain: Chain, j: int, allowed: tuple[float, float]
-) -> Chain | None:
+    arm: Arm, route: Route, s: Array, chain: BranchChain, next_chain: BranchChain, j: int, allowed: tuple[float, float]
+) -> BranchChain | None:
     """A chain up to a window around sample j, then `next_chain`, which may be the same; None: no window is allowed."""
     next_sample = max(j, next_chain.first)  # at a singularity one chain may end before the other begins
     if not (chain.first <= j <= chain.last and next_sample <= next_chain.last and s[next_sample] - s[j] <= _WINDOW_GAP):
@@ -169,7 +171,7 @@ def _chain_through_window(
     q = np.concatenate([chain.q[: a + 1 - chain.first], q_inside, next_chain.q[b - next_chain.first :] + offset])
     left, right = chain.labels[: j - chain.first], next_chain.labels[next_sample - next_chain.first :]
     labels = np.concatenate([left, np.repeat(right[:1], len(q) - len(left) - len(right)), right])
-    return Chain(arm, chain.first, q, labels, (*chain.windows, crossing))
+    return BranchChain(arm, chain.first, q, labels, (*chain.windows, crossing))
 
 
 def _joints_in_window(arm: Arm, route: Route, window: Window, s: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.model import units
-from armkin.motion.branches.branch_chains import Chain, end_reason
+from armkin.motion.branches.branch_chains import BranchChain, end_reason
 from armkin.motion.branches.joint_steps import joint_change
 from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
 from armkin.motion.plan.trajectory_proof import hit_text
@@ -87,7 +87,9 @@ def _branch_name(columns: BranchColumns, label: int) -> str:
     return columns.names[label] if 0 <= label < len(columns.names) else ""
 
 
-def _reconfiguration_at(arm: Arm, columns: BranchColumns, chain: Chain, first: int, offset: float) -> Reconfiguration:
+def _reconfiguration_at(
+    arm: Arm, columns: BranchColumns, chain: BranchChain, first: int, offset: float
+) -> Reconfiguration:
     """The place and the reason at which a run from sample `first` ends."""
     reason = end_reason(columns, chain, first)
     last_sample = max(chain.carries_to(first), 0)
