@@ -60,7 +60,7 @@ class Request:
         return units.home_out(self.arm) if self.near is None else list(self.near)
 
 
-class Branch(NamedTuple):
+class TargetBranch(NamedTuple):
     """One branch of one target, as joint values of the whole arm."""
 
     q: Array  # (n,) [rad | mm]
@@ -89,7 +89,7 @@ class Answer(NamedTuple):
     why: str
     complete: bool
     free: list[str]
-    branches: list[Branch]  # those within limits first, of these the free ones, then by motion
+    branches: list[TargetBranch]  # those within limits first, of these the free ones, then by motion
     best: int | None
     refused: str | None = None  # why no branch of the requested name is the best one
     total: int = 0  # number of branches found, which may exceed `branches`
@@ -170,7 +170,7 @@ def follow_targets(request: Request, answers: Sequence[Answer]) -> Iterator[tupl
             request = replace(request, near=branches[best].joints)
 
 
-def _nearest_copy(arm: Arm, branch: Branch, near: Array, held: Sequence[int]) -> Branch:
+def _nearest_copy(arm: Arm, branch: TargetBranch, near: Array, held: Sequence[int]) -> TargetBranch:
     """The copy of a branch nearest to a pose (n,); held joints keep their values."""
     rows, _ = nearest_row(arm, branch.q[None], near[None])
     q = rows[0]
@@ -192,7 +192,7 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in nearest_each] if held else nearest_each
 
 
-def turns(request: Request, branch: Branch) -> list[list[float]]:
+def turns(request: Request, branch: TargetBranch) -> list[list[float]]:
     """All copies of a branch within limits, whole turns away, the nearest first [deg | mm]; held joints stay."""
     arm = request.arm
     copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
@@ -229,7 +229,7 @@ def blocked_error(request: Request, answer: Answer) -> NoBranchError:
     )
 
 
-def _best_branch(request: Request, branches: Sequence[tuple[Branch, bool]]) -> int | None:
+def _best_branch(request: Request, branches: Sequence[tuple[TargetBranch, bool]]) -> int | None:
     """Index of the first wanted branch (by its flag) within limits and free of hits, unless hits are ignored."""
     free = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.may_be_taken)
     hit = (i for i, (branch, wanted) in enumerate(branches) if wanted and branch.within_limits and request.ignore)
@@ -263,7 +263,7 @@ def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, nea
     flags = zip(s.valid.tolist(), s.status.tolist(), s.complete.tolist(), strict=True)
     for i, (valid, status, proved) in enumerate(flags):
         branches = [
-            Branch(
+            TargetBranch(
                 q[i, b],
                 joints[i][b],
                 s.names[names[i][b]],
@@ -294,7 +294,7 @@ class _SweptTarget:
     free: set[str] = field(default_factory=set)
     total: int = 0
     legal: int = 0
-    branches: list[tuple[Branch, bool]] = field(default_factory=list)  # branch, and whether it has the requested name
+    branches: list[tuple[TargetBranch, bool]] = field(default_factory=list)  # each, and whether its name is requested
 
     def add(self, status: int, answer: Answer, wanted_names: set[str]) -> None:
         """Add the answer for one combination of values."""
@@ -311,7 +311,7 @@ class _SweptTarget:
 
     def thin_out(self, request: Request) -> None:
         """Keep only the nearest branch of every name, inside and outside limits."""
-        nearest: dict[tuple[str, bool, bool], tuple[Branch, bool]] = {}
+        nearest: dict[tuple[str, bool, bool], tuple[TargetBranch, bool]] = {}
         for item in sorted(self.branches, key=lambda item: _rank(request, item[0])):
             nearest.setdefault((item[0].name, item[0].within_limits, item[0].may_be_taken), item)
         # Copy q, which is a row of the large array of all targets.
@@ -338,13 +338,13 @@ class _SweptTarget:
         )  # fmt: skip
 
 
-def _rank(request: Request, branch: Branch) -> tuple[bool, bool, float, float]:
+def _rank(request: Request, branch: TargetBranch) -> tuple[bool, bool, float, float]:
     hit = branch.within_limits and bool(branch.hits)  # hits outside limits do not count
     angle = round(branch.residual_deg, tol.EQUAL_DECIMALS) if request.position_first else 0.0
     return not branch.within_limits, hit, angle, round(branch.motion, tol.EQUAL_DECIMALS)
 
 
-def _refusal_reasons(request: Request, named: Sequence[Branch]) -> str:
+def _refusal_reasons(request: Request, named: Sequence[TargetBranch]) -> str:
     """The reasons why the branches of the requested name are refused: limits or hits."""
     if not named:
         return f"no branch called '{request.branch}' reaches this target"

@@ -161,7 +161,7 @@ def _shown_fields(
     return {"closest": closest}
 
 
-def _branch_json(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
+def _branch_json(arm: Arm, branch: choose_branch.TargetBranch) -> dict[str, Any]:
     """A branch as the page lists it."""
     return {
         "name": branch.name,
@@ -173,7 +173,7 @@ def _branch_json(arm: Arm, branch: choose_branch.Branch) -> dict[str, Any]:
     }
 
 
-def _branch_of_pose(branches: Sequence[choose_branch.Branch], q: Array) -> int | None:
+def _branch_of_pose(branches: Sequence[choose_branch.TargetBranch], q: Array) -> int | None:
     """The index of the branch of a pose; None on a self-motion, which has many poses."""
     for index, branch in enumerate(branches):
         change = np.abs(branch.q - q)

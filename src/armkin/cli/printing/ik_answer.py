@@ -107,12 +107,12 @@ def closest_pose(
     return answer
 
 
-def _near_to(arm: Arm, branch: choose_branch.Branch) -> Any:
+def _near_to(arm: Arm, branch: choose_branch.TargetBranch) -> Any:
     """What a branch is near to, where there are keep-outs."""
     return {"clearance_mm": branch.clearance, "hits": list(branch.hits)} if arm.keep_out else {}
 
 
-def _branch_json(request: choose_branch.Request, branch: choose_branch.Branch, turns: bool) -> Branch:
+def _branch_json(request: choose_branch.Request, branch: choose_branch.TargetBranch, turns: bool) -> Branch:
     """A branch as data of JSON [deg | mm]; turns: with its other turns within limits."""
     arm = request.arm
     row: Branch = {

@@ -11,7 +11,7 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.motion.branches.branch_chains import BranchChain, end_reason
 from armkin.motion.branches.joint_steps import joint_change
-from armkin.motion.plan.path_plan import Branch, Passed, PathPlan, PathRun, Reconfiguration
+from armkin.motion.plan.path_plan import Passed, PathPlan, PathRun, Reconfiguration, StartBranch
 from armkin.motion.plan.trajectory_proof import hit_text
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ def _branch_names(columns: BranchColumns, run: Run, offset: float) -> list[tuple
     ]
 
 
-def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[Branch]:
+def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[StartBranch]:
     """The branches at the start, sorted by how far each carries; of equal ones the chosen branch comes first."""
     columns, last_and_branch, first_run_branch = carried_route.columns, [], None
     for chain in carried_route.chains:
@@ -69,11 +69,13 @@ def _start_branches(arm: Arm, carried_route: CarriedRoute, near: Array) -> list[
             q = joints[0].copy()  # a view would keep the whole chain
             length = float(columns.s[last]) if last >= 0 else 0.0
             end_text = reason_text(arm, _reconfiguration_at(arm, columns, chain, 0, 0.0))
-            last_and_branch.append((last, Branch(_branch_name(columns, int(chain.labels[0])), q, length, end_text)))
+            last_and_branch.append(
+                (last, StartBranch(_branch_name(columns, int(chain.labels[0])), q, length, end_text))
+            )
             if carried_route.runs and chain is carried_route.runs[0].chain:
                 first_run_branch = last_and_branch[-1][1]
     last_and_branch.sort(key=lambda pair: (-round(pair[1].carries, 2), pair[1] is not first_run_branch))
-    distinct: list[Branch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
+    distinct: list[StartBranch] = []  # a branch appears twice if it can also pass a wrist singularity; list it once
     for _, branch in last_and_branch:
         q = branch.start_joints
         if not any(
@@ -217,7 +219,7 @@ def _reconfiguration_fields(arm: Arm, change: Reconfiguration) -> dict[str, Any]
     }
 
 
-def _branch_fields(arm: Arm, branch: Branch) -> dict[str, Any]:
+def _branch_fields(arm: Arm, branch: StartBranch) -> dict[str, Any]:
     return {
         "name": branch.name,
         "start_joints": units.joints_out(arm, branch.start_joints).tolist(),

@@ -62,7 +62,7 @@ class Passed:
 
 
 @dataclass(frozen=True)
-class Branch:
+class StartBranch:
     """A branch at the path's start, the length that it carries, and why it ends."""
 
     name: str
@@ -122,7 +122,7 @@ class PathPlan:
     reduced: ReducedBlends = field(default_factory=ReducedBlends)
     passed: list[Passed] = field(default_factory=list)
     runs: list[PathRun] = field(default_factory=list)
-    branches: list[Branch] = field(default_factory=list)
+    branches: list[StartBranch] = field(default_factory=list)
     reconfigurations: list[Reconfiguration] = field(default_factory=list)
     nearest_singularity: tuple[float, float, Array] | None = None
     markers: list[Marker] = field(default_factory=list)
