@@ -8,8 +8,9 @@ from three_servos import ARM, HOME, connect_servos, servo_bus
 
 import armkin
 from armkin.board.backend import StoppedError
+from armkin.board.backend.servo_arm import MAX_LAG, SETTLED_DISTANCE
 from armkin.board.feetech import registers
-from armkin.board.feetech.feetech_machine import MAX_LAG, SETTLED_DISTANCE, ServoMachine
+from armkin.board.feetech.feetech_machine import ServoMachine
 from armkin.board.sim.sim_servo_bus import Noise, Servo, ServoBus
 from armkin.errors import LinkError, NoSolutionError
 

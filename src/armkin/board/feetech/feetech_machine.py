@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.servo_arm import MAX_LAG, SETTLED_DISTANCE, ServoArm, job, servo_ids
+from armkin.board.backend.servo_arm import ServoArm
 from armkin.board.feetech import registers
 from armkin.board.feetech.bus import Bus
 
 if TYPE_CHECKING:
     from armkin.board.ports import Port
     from armkin.formula.arrays import Array
-
-__all__ = ["MAX_LAG", "SETTLED_DISTANCE", "ServoMachine", "job", "servo_ids"]
 
 _MAX_COUNTS = 1 << 30  # position [counts] that bounds a servo without limits
 CATCH_UP_FACTOR = 1.5  # a servo may move at this multiple of the trajectory's speed to catch up

@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.board import Board, Gripped
+from armkin.board.backend.servo_arm import job, servo_ids
 from armkin.board.feetech import registers, servo_gripper
 from armkin.board.feetech.bus import Bus
-from armkin.board.feetech.feetech_machine import ServoMachine, job, servo_ids
+from armkin.board.feetech.feetech_machine import ServoMachine
 from armkin.board.feetech.lerobot import ServoCalibration, calibration_edits
 from armkin.board_catalogue import ForeignBoard
 from armkin.motors import pulses
