@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
@@ -145,6 +146,9 @@ class Solutions:
         mm = np.linalg.norm(missing[:, :p], axis=1).reshape(self.valid.shape)
         rad = np.linalg.norm(missing[:, p:], axis=1).reshape(self.valid.shape)
         return mm, rad
+
+
+Ik = Callable[..., Solutions]  # `armkin.ik`; functions that `inverse.solve` imports take it as an argument
 
 
 def _rounded_motion(motion: Array) -> Array:

@@ -18,7 +18,7 @@ from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
 from armkin.inverse.answers import rounding as target_rounding
 from armkin.inverse.answers.batch import Batch, Goals, as_solutions
-from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.answers.solutions import Ik, Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -27,7 +27,7 @@ from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.curve_starts import PLANES
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
-from armkin.inverse.redundant.other_joints import Follower, Ik
+from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.traced_families import Traced, trace_families
 from armkin.inverse.solvers.redundancy import Redundancy, move_targets, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets

@@ -6,7 +6,6 @@ branches merge, and beside a straight shoulder or wrist, joints turn without bou
 """
 
 import math
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any, NamedTuple, Self
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from armkin.formula.arrays import Array, Bool, Entry, Int, slices
 from armkin.formula.trace import StraightLineCode
-from armkin.inverse.answers.solutions import Solutions
+from armkin.inverse.answers.solutions import Ik
 from armkin.inverse.branches.whole_turns import nearest_of_joint, nearest_row
 from armkin.inverse.closed.candidates import recorded_formula, target_entries
 from armkin.inverse.closed.subproblems import Pair
@@ -25,7 +24,6 @@ from armkin.inverse.solvers.recognise import solver
 from armkin.inverse.solvers.redundancy import Redundancy, move_entries, move_targets
 from armkin.model.arm import Arm
 
-Ik = Callable[..., Solutions]
 AT_A_TIME = 2_000  # targets that a formula solves at once: they stay in the cache
 SAFE = 4.0  # safety factor on the bend that the samples show
 LIMIT_DISTANCE = 0.3  # distance [rad] of a limit within which a branch can come to it before the next sample

@@ -4,7 +4,6 @@ Over the postures within limits whose tool stands at the target's position, a fa
 are the local minima of the rotation angle: `least_rotation` descends to them from many postures at once.
 """
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
 
@@ -17,7 +16,7 @@ from armkin.forward import fk, position, tip_and_jacobian
 from armkin.inverse.answers import closest
 from armkin.inverse.answers.batch import Goals, as_solutions, empty_batch
 from armkin.inverse.answers.closest import Closest
-from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.answers.solutions import Ik, Solutions, Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
@@ -36,7 +35,6 @@ NEAREST_POSTURES = 1024  # postures of the pool that are nearest to a target's p
 STARTS = 256  # starts of a target: those of the nearest postures that are farthest from each other
 AT_ONCE = 64  # targets worked on together
 METHOD = "position first"
-Ik = Callable[..., Solutions]
 
 
 def check_arm(arm: Arm, task: str | None) -> None:
