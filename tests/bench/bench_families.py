@@ -19,7 +19,7 @@ import armkin
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 from redundant_arms import covers_value, held_answers, redundant_postures
 
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 
 ARMS = ("panda", "iiwa7", "kinova_gen3")
 AT_ONCE = 250

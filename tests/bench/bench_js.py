@@ -26,7 +26,7 @@ import armkin
 from armkin.errors import UsageError
 from armkin.export.c.c_program import identifier, program
 from armkin.export.js.es_module import module_text
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.model.arm import actual_arm
 from armkin.robot_file import catalogue
 

@@ -15,8 +15,8 @@ import armkin
 import right_angles
 from armkin.errors import UsageError
 from armkin.export.js.es_module import module_text
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundancy import redundancy
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import nearest_rotation, targets_of
 

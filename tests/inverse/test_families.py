@@ -9,7 +9,7 @@ from armkin import Status
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.model.arm import from_links
 from command_line import run
 

@@ -14,7 +14,7 @@ from armkin.formula.arrays import Array
 from armkin.inverse import solve
 from armkin.inverse.answers.solutions import Solutions
 from armkin.inverse.redundant.families import families
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.inverse.tasks.choose_task import default_task
 
 if TYPE_CHECKING:

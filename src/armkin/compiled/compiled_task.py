@@ -25,8 +25,8 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.numeric.tolerances import FAR_DISTANCE, SOLUTION
 from armkin.inverse.singular import near_itself
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundancy import redundancy
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.model.arm import actual_arm
 

@@ -26,7 +26,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import intervals_out
 from armkin.inverse.redundant.position_first import closest_each as nearest_positions
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import arm_without, redundant_alone, without_held
+from armkin.inverse.solvers.choose_redundant_joint import arm_without, redundant_alone, without_held
 from armkin.keep_out.clearance import Hit, hits, hits_text
 from armkin.model import limits, units
 from armkin.model.arm import Arm

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armkin.errors import UsageError
-from armkin.inverse.solvers.redundancy import redundant_joint
+from armkin.inverse.solvers.choose_redundant_joint import redundant_joint
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.model import units
 from armkin.model.arm import actual_arm

@@ -9,7 +9,7 @@ import numpy as np
 
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import Redundancy, move_targets, redundancy
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, move_targets, redundancy
 from armkin.inverse.tasks.task import distance
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model.arm import actual_arm

@@ -103,7 +103,7 @@ def _motor_json(motor: Motor, file: RobotFile) -> dict[str, Any]:
 def _solving_json(arm: Arm, name: str | None) -> Solving:
     """The task and its solver, or why there is none."""
     from armkin.inverse.redundant.families import method_of_families
-    from armkin.inverse.solvers.redundancy import redundancy
+    from armkin.inverse.solvers.choose_redundant_joint import redundancy
     from armkin.inverse.tasks.choose_task import task_for
     from armkin.model.arm import actual_arm
 

@@ -126,7 +126,7 @@ def _branch_json(request: choose_branch.Request, branch: choose_branch.TargetBra
     }
     row.update(_near_to(arm, branch))
     from armkin.inverse import choose_branch
-    from armkin.inverse.solvers.redundancy import redundant_joint
+    from armkin.inverse.solvers.choose_redundant_joint import redundant_joint
 
     if branch.interval is not None:
         row["family"] = {

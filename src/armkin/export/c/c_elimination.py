@@ -22,13 +22,13 @@ from armkin.inverse.elimination.roots import STEADY_ENTRY
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import BESIDE_SPECIAL, SHAKES
 from armkin.inverse.solvers import tool_axis
-from armkin.inverse.solvers.redundancy import move_entries
+from armkin.inverse.solvers.choose_redundant_joint import move_entries
 from armkin.model.rotation import inverse
 
 if TYPE_CHECKING:
     from armkin.inverse.elimination.closed_loop import Loop
     from armkin.inverse.elimination.pencil import Pencil
-    from armkin.inverse.solvers.redundancy import Redundancy
+    from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 

@@ -18,14 +18,14 @@ from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.numeric.tolerances import CLOSE_DISTANCE, DECIMAL, FLOAT32
+from armkin.inverse.solvers.choose_redundant_joint import held_by_near, redundancy
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundancy import held_by_near, redundancy
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED
 from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
-    from armkin.inverse.solvers.redundancy import Redundancy
+    from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 

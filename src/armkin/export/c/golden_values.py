@@ -11,7 +11,7 @@ from armkin.formula.c_and_js_code import number_text
 from armkin.forward import fk
 from armkin.inverse.numeric.newton import null_space
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock, unlock

@@ -20,8 +20,8 @@ from armkin.export.keep_out_pairs import pair_tables
 from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.inverse.solvers.recognise import solver
-from armkin.inverse.solvers.redundancy import redundancy
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock
@@ -30,7 +30,7 @@ from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
-    from armkin.inverse.solvers.redundancy import Redundancy
+    from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 

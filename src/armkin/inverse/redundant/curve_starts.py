@@ -21,7 +21,7 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
 from armkin.inverse.redundant.interval_pieces import may_turn_back
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
-from armkin.inverse.solvers.redundancy import Redundancy, arm_without, nearly_closed
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, arm_without, nearly_closed
 
 PLANES = 60  # values of the joint at which the target is solved
 WAY_PARTS = 12  # parts of the way between two planes, where answers may be that neither plane has

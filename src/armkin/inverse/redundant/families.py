@@ -29,7 +29,7 @@ from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
 from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.traced_families import Traced, trace_families
-from armkin.inverse.solvers.redundancy import Redundancy, move_targets, nearly_closed
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, move_targets, nearly_closed
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets
 from armkin.keep_out.clearance import hits_nothing
 from armkin.model import units

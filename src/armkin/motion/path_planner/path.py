@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.motion.joint_moves import check_rates
 from armkin.motion.path_planner.path_request import HOLD_FACTOR, PathRequest, plan_path
 from armkin.motion.path_planner.redundant_joint import path_redundant

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.redundancy import Redundancy, move_targets, redundancy
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, move_targets, redundancy
 from armkin.keep_out.clearance import clearance
 from armkin.model.arm import actual_arm
 from armkin.motion.path_planner.held_joints import path_held

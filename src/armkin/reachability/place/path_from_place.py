@@ -16,7 +16,7 @@ import numpy as np
 from armkin import path_file
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.inverse.solvers.redundancy import redundancy
+from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.motion.joint_moves import check_rates
 from armkin.reachability.place.arm_among_obstacles import Obstacles, arm_at_place
 
