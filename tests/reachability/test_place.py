@@ -14,7 +14,7 @@ from armkin.cli.batches import compiled_ik
 from armkin.errors import NoSolutionError, UsageError
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
-from armkin.motion.path_planner import redundant_joint
+from armkin.motion.path_planner import choose_held_value
 from armkin.reachability.place import path_from_place, reached_targets, upright_joint
 from armkin.reachability.place import place_search as places
 from armkin.reachability.place.arm_among_obstacles import Obstacles, arm_at_place
@@ -235,9 +235,9 @@ def test_a_path_of_seven_joints_is_carried_where_path_plans_it(first_move: str, 
 
 
 def test_the_command_tells_where_the_redundant_joint_is_held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    all_values = redundant_joint.values_to_hold
+    all_values = choose_held_value.values_to_hold
     monkeypatch.setattr(
-        redundant_joint, "values_to_hold", lambda *arguments: all_values(*arguments)[:6]
+        choose_held_value, "values_to_hold", lambda *arguments: all_values(*arguments)[:6]
     )  # each is an arm to prepare
     path, scene = tmp_path / "path.yaml", tmp_path / "scene.yaml"
     path.write_text(LINE)

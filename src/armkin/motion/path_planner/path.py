@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
 from armkin.motion.joint_moves import check_rates
+from armkin.motion.path_planner.choose_held_value import path_redundant
 from armkin.motion.path_planner.path_request import HOLD_FACTOR, PathRequest, plan_path
-from armkin.motion.path_planner.redundant_joint import path_redundant
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.tool_path import path_numbers
 

@@ -61,7 +61,7 @@ def ways_of_path(arm: Arm, file: PathFile) -> tuple[Task, list[Array]]:
 
 def joint_to_hold(arm: Arm, file: PathFile) -> tuple[str, tuple[float, ...]]:
     """The redundant joint that a plan holds, and its possible values [rad], as in `armkin.path`; "" without one."""
-    from armkin.motion.path_planner.redundant_joint import values_to_hold
+    from armkin.motion.path_planner.choose_held_value import values_to_hold
 
     redundant = redundancy(arm, file.task)
     return ("", ()) if redundant is None else (arm.joint_names[redundant.joint], values_to_hold(arm, file, redundant))
