@@ -61,7 +61,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm as Arm
     from armkin.model.lock_joints import lock as lock
     from armkin.model.lock_joints import unlock as unlock
-    from armkin.motion.drawings import drawing as drawing
+    from armkin.motion.drawing_to_path import drawing as drawing
     from armkin.motion.path_planner.path import path as path
     from armkin.motion.plan.path_plan import PathPlan as PathPlan
     from armkin.motion.time_law import time_law as time_law
@@ -106,7 +106,7 @@ _HOME = {
     "Arm": "model.arm",
     "lock": "model.lock_joints",
     "unlock": "model.lock_joints",
-    "drawing": "motion.drawings",
+    "drawing": "motion.drawing_to_path",
     "path": "motion.path_planner.path",
     "time_law": "motion.time_law",
     "PathPlan": "motion.plan.path_plan",

@@ -7,7 +7,7 @@ tool_path/       the tool's way: lines, arcs, splines, blends, dense points, one
 plan/            the answer, how it is drawn, and the proof that it hits nothing
 branches/        the joints' ways: every branch along the tool's way, and the one that is taken
 path_planner/    `armkin.path`: through the moves of a path, one after another, to their plan
-drawings.py      `armkin.drawing`: G-code and SVG as such a path
+drawing_to_path.py      `armkin.drawing`: G-code and SVG as such a path
 
 The way of waypoints:
 

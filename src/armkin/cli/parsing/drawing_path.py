@@ -42,7 +42,7 @@ class Placement(NamedTuple):
 def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Placement) -> PathFile | None:
     """The moves of a drawing; None: the file is none. Raises UsageError for options that make no sense."""
     from armkin import path_file
-    from armkin.motion.drawings import drawing
+    from armkin.motion.drawing_to_path import drawing
 
     if file is None or path_file.drawing_language(file) is None:
         if given_names := [name for name, value in placement._asdict().items() if value is not None]:
