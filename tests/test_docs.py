@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.errors import UsageError
-from armkin.inverse.solvers import recognise
+from armkin.inverse.solvers import solver_of_arm
 from armkin.robot_file import catalogue
 from slow import SLOW
 
@@ -37,13 +37,13 @@ def test_links_between_pages_lead_somewhere() -> None:
 
 def test_the_solvers_table_has_every_class_in_its_order() -> None:
     files = re.findall(r"\| `(inverse/[a-z_/]+)\.py` \|", SOLVER.read_text())
-    order = [_module_of(function) for function in recognise._CLASSES]
+    order = [_module_of(function) for function in solver_of_arm._CLASSES]
     assert [{"inverse/elimination/method": "inverse/solvers/general"}.get(name, name) for name in files] == order
 
 
 def _module_of(function: object) -> str:
     name = str(getattr(function, "__module__", "")).removeprefix("armkin.").replace(".", "/")
-    return "inverse/solvers/tool_axis" if name == "inverse/solvers/recognise" else name
+    return "inverse/solvers/tool_axis" if name == "inverse/solvers/solver_of_arm" else name
 
 
 def test_the_methods_of_the_shipped_robots_are_on_the_page() -> None:

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from armkin.inverse.answers.solutions import Status as Status
     from armkin.inverse.branches.whole_turns import turns as turns
     from armkin.inverse.solve import ik as ik
-    from armkin.inverse.solvers.recognise import method as method
+    from armkin.inverse.solvers.solver_of_arm import method as method
     from armkin.keep_out.clearance import Clearance as Clearance
     from armkin.keep_out.clearance import clearance as clearance
     from armkin.keep_out.load_with_scene import load as load
@@ -96,7 +96,7 @@ _HOME = {
     "turns": "inverse.branches.whole_turns",
     "Closest": "inverse.answers.closest",
     "closest": "inverse.answers.closest",
-    "method": "inverse.solvers.recognise",
+    "method": "inverse.solvers.solver_of_arm",
     "Solutions": "inverse.answers.solutions",
     "Status": "inverse.answers.solutions",
     "ik": "inverse.solve",

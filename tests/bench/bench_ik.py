@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 
 import armkin
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import from_links
 from armkin.model.rotation import rotation_about
 

@@ -64,7 +64,7 @@ def keep_outs() -> bool:
 
 def places_agree(solve: Any = armkin.ik) -> bool:
     """400 poses from 37 x 37 places and 72 yaws, every shipped arm with a closed form; 1,000 places asked directly."""
-    from armkin.inverse.solvers.recognise import solver
+    from armkin.inverse.solvers.solver_of_arm import solver
     from armkin.inverse.tasks.task import targets_of
     from armkin.reachability.place import reached_targets
     from armkin.robot_file import catalogue

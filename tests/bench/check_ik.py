@@ -32,7 +32,7 @@ from shipped_arms import NAMES, shipped_arm
 
 import armkin
 from armkin.errors import UsageError
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import Arm
 
 HEAD = "method | poses | lost | branches | mm | deg | twice | us/pose"

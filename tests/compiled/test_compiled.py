@@ -18,7 +18,7 @@ from left_to_python import left_to_python
 import armkin
 from armkin.compiled import toolchain
 from armkin.inverse.elimination import method
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.build_arm import arm_of_file
 from armkin.robot_file import parse_robot_file

@@ -12,7 +12,7 @@ import numpy as np
 
 import armkin
 from armkin.export.c.c_program import identifier, program
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 

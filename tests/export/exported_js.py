@@ -15,7 +15,7 @@ import armkin
 from armkin.export.js.es_module import module_text
 from armkin.inverse.numeric.newton import difference
 from armkin.inverse.singular.local_structure import local_structure, members
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual_arm

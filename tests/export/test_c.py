@@ -15,7 +15,7 @@ from exported_c import Exported, compare_answers, random_postures, texts_of
 import armkin
 import right_angles
 from armkin.export.c.c_program import identifier, program
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.build_arm import arm_of_file
 from armkin.model.rotation import rotation_about

@@ -10,7 +10,7 @@ import truth
 from exported_c import Exported
 from shipped_arms import shipped_arm
 
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 ONE_OF_A_CLASS = ["puma560", "ur5e", "wx250s", "stanford", "labvolt_5150", "three_dof", "cobra600", "planar_2dof"]

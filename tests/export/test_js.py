@@ -16,7 +16,7 @@ import right_angles
 from armkin.errors import UsageError
 from armkin.export.js.es_module import module_text
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import nearest_rotation, targets_of
 

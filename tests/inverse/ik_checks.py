@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from oracle import Goal, Screws
 
 import armkin
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import Arm
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from oracle import goal_of_joints
 
 import armkin
 from armkin.inverse.elimination import method
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 RIGHT_ANGLED = {  # seeds of arms that the elimination settles never, hardly ever or slowly, and their class
     168: "three axes that meet",  # 3, 4 and 5: the elimination has a singular pencil's roots at joint 4 = 0 and 180

@@ -15,7 +15,7 @@ from truth import Array, Bool
 import armkin
 from armkin import Status
 from armkin.inverse.singular import curves
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 STEP = 0.08  # [rad]
 

@@ -15,7 +15,7 @@ from shipped_arms import shipped_arm
 import armkin
 from armkin import Status
 from armkin.inverse.closed import anywhere
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from shipped_arms import shipped_arm
 
 import armkin
 from armkin.inverse.numeric import tolerances
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 PAGE = Path(__file__).parents[2] / "docs/solution.md"

@@ -11,7 +11,7 @@ from shipped_arms import shipped_arm
 
 import armkin
 from armkin import Status
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 def test_points_of_a_self_motion_beside_its_crossing_are_no_branches() -> None:

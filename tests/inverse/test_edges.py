@@ -16,7 +16,7 @@ import armkin
 from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.run import edges
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 ROBOTS = Path(__file__).parents[2] / "robots"
 QUARTER = np.pi / 2

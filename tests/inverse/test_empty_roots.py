@@ -15,7 +15,7 @@ import armkin
 from armkin.inverse.elimination import method, passes, polish, roots
 from armkin.inverse.numeric import tolerances
 from armkin.inverse.numeric.tolerances import LONE_DISTANCE
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.rotation import inverse
 
 

@@ -13,7 +13,7 @@ import armkin
 from armkin import Status
 from armkin.formula.arrays import Array
 from armkin.inverse.elimination import equal_roots
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 def half_powers(q: complex) -> Array:

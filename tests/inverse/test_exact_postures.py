@@ -13,7 +13,7 @@ from oracle import distance, goal_of_joints
 
 import armkin
 from armkin import Status
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 POSTURES = exact_postures.read_postures()
 REACH = 0.1  # [rad, reaches] how far a component reaches that is no manifold: docs/solution.md

@@ -11,7 +11,7 @@ from shipped_arms import shipped_arm
 
 import armkin
 from armkin import Status
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 @pytest.mark.parametrize("q", [[180, 180, 180, 180, -90, 0], [0, 180, 0, 0, 90, 90]])

@@ -11,7 +11,7 @@ from shipped_arms import shipped_arm
 import armkin
 from armkin import Status
 from armkin.inverse.singular.local_structure import local_structure
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 OFFSETS = np.array([0.0, 1e-12, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2])
 RANK = {Status.SINGULAR: 2, Status.BOUNDARY: 1, Status.EXACT: 0}

@@ -10,7 +10,7 @@ import pytest
 from shipped_arms import shipped_arm
 
 import armkin
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 

@@ -12,7 +12,7 @@ from shipped_arms import UNLIKE, shipped_arm
 
 import armkin
 from armkin import Status
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 @pytest.mark.parametrize("name", UNLIKE)

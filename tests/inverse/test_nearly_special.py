@@ -13,7 +13,7 @@ from shipped_arms import shipped_arm
 
 import armkin
 from armkin.inverse.numeric import newton
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 def check_case(name: str, size: float, seed: int, count: int) -> Report:

@@ -16,7 +16,7 @@ from armkin.inverse.answers.batch import Examined, Goals
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import newton
 from armkin.inverse.singular import groups
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import shifted_targets, targets_of
 from armkin.model.arm import Arm
 

@@ -11,7 +11,7 @@ import right_angles
 from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.answers.rounding import of_targets, printed_rounding
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import LABELS
 from armkin.model.target_numbers import targets_out
 from command_line import run

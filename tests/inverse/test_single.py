@@ -15,7 +15,7 @@ from shipped_arms import UNLIKE, shipped_arm
 import armkin
 from armkin.inverse.branches.whole_turns import nearest_copy, nearest_number
 from armkin.inverse.run import single as one_target
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import Arm
 
 # without a closed form, of which none is answered in plain numbers

@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.inverse import choose_branch
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 ARM = armkin.load("planar_3dof")
 TARGETS = np.random.default_rng(3).uniform([50, -100], [250, 100], (40, 2))

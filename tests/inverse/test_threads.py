@@ -12,7 +12,7 @@ import armkin
 from armkin.engines.threads import share_rows
 from armkin.errors import UsageError
 from armkin.formula import arrays
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 

@@ -12,7 +12,7 @@ from oracle import goal_of_joints
 
 import armkin
 from armkin import Status
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 
 
 def gantry_case(pattern: str, axes: str) -> Case:

@@ -9,7 +9,7 @@ import pytest
 
 import armkin
 from armkin.inverse.branches.tracking import follow_branches
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 
 ROBOTS = Path(__file__).parents[2] / "robots"

@@ -21,7 +21,7 @@ from armkin import Status
 from armkin.errors import UsageError
 from armkin.inverse.answers.batch import Goals
 from armkin.inverse.singular import groups
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import from_links
 
 

@@ -18,7 +18,7 @@ from oracle import Goal, Screws
 import armkin
 from armkin import Status
 from armkin.inverse.answers.rounding import last_place, last_place_of_position
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import Arm
 from armkin.model.rotation import rpy
 

@@ -10,7 +10,7 @@ import pytest
 
 import armkin
 from armkin.errors import UsageError
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import Arm, from_links
 

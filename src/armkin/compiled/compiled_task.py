@@ -26,7 +26,7 @@ from armkin.inverse.branches.tracking import follow_branches
 from armkin.inverse.numeric.tolerances import FAR_DISTANCE, SOLUTION
 from armkin.inverse.singular import near_itself
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import distance, read_targets
 from armkin.model.arm import actual_arm
 

@@ -34,7 +34,7 @@ from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examine_targets
 from armkin.inverse.singular import legal_postures, near_itself
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task, distance, flat_targets, read_near, read_targets, targets_around, targets_at
 from armkin.model.arm import Arm, actual_arm

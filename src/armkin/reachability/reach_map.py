@@ -21,7 +21,7 @@ from armkin.engines.ordered_chunks import Engine
 from armkin.errors import UsageError
 from armkin.files import check_writable, file_ending, write_whole
 from armkin.formula.arrays import Array
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import actual_arm
 from armkin.model.units import TURN
 from armkin.reachability import kept_chunks

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from armkin.errors import UsageError
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model import units
 from armkin.model.arm import actual_arm
 from armkin.model.target_numbers import label_units

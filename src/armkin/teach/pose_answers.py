@@ -13,7 +13,7 @@ from armkin.errors import UsageError
 from armkin.forward import fk
 from armkin.inverse import choose_branch
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers import recognise
+from armkin.inverse.solvers import solver_of_arm
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import hits, hits_text
@@ -86,7 +86,7 @@ def _solvable_task(arm: Arm) -> tuple[Task | None, str]:
     """The task that the page solves; None and the reason if branches cannot be listed."""
     try:
         task = task_for(arm)
-        recognise.solver(arm, task.name)
+        solver_of_arm.solver(arm, task.name)
         return task, ""
     except UsageError as error:
         return None, str(error)

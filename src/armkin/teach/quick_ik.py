@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from armkin.errors import ArmkinError
 from armkin.forward import fk
 from armkin.inverse.solve import ik
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.arm import actual_arm
 

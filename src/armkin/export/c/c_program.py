@@ -19,7 +19,7 @@ from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.numeric.tolerances import CLOSE_DISTANCE, DECIMAL, FLOAT32
 from armkin.inverse.solvers.choose_redundant_joint import held_by_near, redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED
 from armkin.model.arm import actual_arm
 

@@ -21,7 +21,7 @@ from armkin.formula import c_and_js_code, recording
 from armkin.inverse.branches.names import branch_names
 from armkin.inverse.elimination.merge import MAX_ANSWERS
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.keep_out.bodies import ends_formula
 from armkin.model.arm import actual_arm
 from armkin.model.lock_joints import lock

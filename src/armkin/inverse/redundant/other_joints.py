@@ -21,7 +21,7 @@ from armkin.inverse.closed.subproblems import Pair
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import motion_of_joint, within_limits
 from armkin.inverse.solvers.choose_redundant_joint import Redundancy, move_entries, move_targets
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.model.arm import Arm
 
 AT_A_TIME = 2_000  # targets that a formula solves at once: they stay in the cache

@@ -21,7 +21,7 @@ from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.least_rotation import Box, box_of, descend, flat_minima
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.residuals import residual
 from armkin.inverse.tasks.task import Task, read_near, read_targets

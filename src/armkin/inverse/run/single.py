@@ -21,7 +21,7 @@ from armkin.inverse.branches.whole_turns import nearest_number
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.singular.near_itself import COARSE_ROOM, ROOM
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.task import MAX_TARGET, ROUNDED, rotation_check
 from armkin.model.arm import Arm, actual_arm
 from armkin.model.limits import SLACK

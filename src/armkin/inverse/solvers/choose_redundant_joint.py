@@ -15,7 +15,7 @@ from armkin.inverse.closed import spherical, three_parallel
 from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.closed.subproblems import Candidates, Pair, Prefer
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.solvers.recognise import solver
+from armkin.inverse.solvers.solver_of_arm import solver
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
