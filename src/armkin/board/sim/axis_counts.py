@@ -7,14 +7,17 @@ from armkin.board.sim.host_settings import Setup
 
 
 def limit_rule_holds(lower: int, upper: int, old_count: int, new_count: int) -> bool:
-    """The limit rule: inside, or not farther outside than before."""
+    """Whether the limits [steps, or weighted steps of a row] let an axis or row go from its old count to the new one.
+
+    Returns True where the new count is within them, or no farther outside on that side than the old one.
+    """
     if new_count < lower:
         return new_count >= old_count
     return new_count <= upper or new_count <= old_count
 
 
 def row_value(row: RowImage, counts: list[int]) -> int:
-    """Sum of weight x count."""
+    """The sum of weight x count [steps] over the axes, which the row's limits bound."""
     return sum(weight * count for weight, count in zip(row.weight, counts, strict=True))
 
 

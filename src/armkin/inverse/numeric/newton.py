@@ -89,11 +89,11 @@ def correct(
 
 
 def many_starts(arm: Arm, task: Task, target: Array, selected: Bool) -> Array:
-    """What Newton's method leads to from the same random postures for each target that may lack branches.
+    """Move the same `STARTS` random postures by Newton's method onto each selected target: a search, no proof.
 
-    target: (N, m) or (N, 4, 4); selected: (N,), some. Returns (N, STARTS, n) postures that miss a target by less than
-    `SEED_RESIDUAL`, nan elsewhere: a search, no proof. Of roots that Newton's method only approaches, the nearest round
-    posture, if that is better.
+    target: (N, m) or (N, 4, 4); selected: (N,) targets that may lack branches. Returns (N, STARTS, n) [rad | mm]: the
+    postures that miss their target by less than `SEED_RESIDUAL`, nan elsewhere. A root of high order, which Newton's
+    method only approaches, is replaced by the nearest posture of multiples of `ROUND`, if that misses by less.
     """
     rng = np.random.default_rng(13)
     start = rng.uniform(-1.0, 1.0, (STARTS, arm.n)) * np.where(arm.prismatic, arm.reach, np.pi)
@@ -181,24 +181,24 @@ class Linear(NamedTuple):
         return cls(r, *np.linalg.svd(J))
 
 
-class Lost(NamedTuple):
-    """What candidates (K, M) lose; those below `FOLD_VALUE` are weak."""
+class LostDirections(NamedTuple):
+    """Joint motions that Jacobians of candidates (K, M) lose; weak are those with sigma perhaps below `FOLD_VALUE`."""
 
-    sigma: Array  # (K, M) smallest singular value, from `FOLD_VALUE` on a lower bound of it
-    nullity: Int  # (K, M) how many directions are lost, of the weak
-    V: Array  # (K, M, n, n) right singular vectors of the weak
-    weak: Linear  # what is known of the weak alone
+    sigma: Array  # (K, M) smallest singular value; of one that is not weak a lower bound, 1 if not selected
+    nullity: Int  # (K, M) number of directions lost, 0 if not weak
+    V: Array  # (K, M, n, n) right singular vectors, 0 where not weak
+    weak: Linear  # residuals and singular value decompositions of the weak candidates alone
     place: Int  # (K, M) row of `weak`, -1 for the others
 
 
-def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Array) -> Lost:
-    """What the candidates q (K, M, n) lose that are selected (K, M), which solve their targets; others nothing."""
+def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Array) -> LostDirections:
+    """Find the directions that candidates q (K, M, n) lose where they are selected (K, M) and solve their targets."""
     K, M, n = q.shape
     sigma, nullity, V = np.ones((K, M)), np.zeros((K, M), np.int64), np.zeros((K, M, n, n))
     place, none = np.full((K, M), -1), np.zeros((0, 0))
     k, b = np.nonzero(selected)
     if not len(k):
-        return Lost(sigma, nullity, V, Linear(none, none, none, none), place)
+        return LostDirections(sigma, nullity, V, Linear(none, none, none, none), place)
     r, J = scaled(arm, task, q[k, b], target[k])
     if J.shape[1] == n == task.constraints:
         # the Frobenius norm of the inverse is no smaller than its largest singular value
@@ -210,7 +210,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Arra
     weak = Linear(r, *np.linalg.svd(J))
     V[k, b], place[k, b] = weak.V, np.arange(len(k))
     sigma[k, b], nullity[k, b] = _smallest(arm, task, weak.S)
-    return Lost(sigma, nullity, V, weak, place)
+    return LostDirections(sigma, nullity, V, weak, place)
 
 
 def nudged(function: Callable[..., Any], matrix: Array, *arguments: Array) -> Array:

@@ -9,7 +9,7 @@ from armkin.formula.arrays import Array, Int
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
-from armkin.inverse.redundant.samples import Changes, Gone, Summary, Turns, nearest_other, value_at
+from armkin.inverse.redundant.samples import BranchEnds, Changes, PossibleCrossings, Summary, nearest_other, value_at
 
 HALVINGS = 60  # steps, at most, to where a branch ends
 SECANTS = 24  # secant steps to a branch's end, of which the later ones halve
@@ -92,7 +92,7 @@ def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:
         return np.asarray(np.where(np.abs(step) < h, value + step, value))
 
 
-def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Changes, Array]:
+def hidden_stretches(follower: Follower, t: Array, turns: PossibleCrossings) -> tuple[Changes, Array]:
     """Stretches (S,) between two samples, legal ones (set_before: no) or gaps (yes), and their two ends (2, S)."""
     row, k, branch, room = turns
     sign = np.sign(room[:, 0])
@@ -120,8 +120,8 @@ def hidden_stretches(follower: Follower, t: Array, turns: Turns) -> tuple[Change
     return Changes(row, k, branch, sign > 0), ends.reshape(2, -1)
 
 
-def _merging_ends(follower: Follower, t: Array, gone: Gone) -> tuple[Array, Array]:
-    """Where branches end to be there (G,), in the order of `Gone`, and how far within limits they are then.
+def _merging_ends(follower: Follower, t: Array, gone: BranchEnds) -> tuple[Array, Array]:
+    """Where branches end to be there (G,), in the order of `BranchEnds`, and how far within limits they are then.
 
     Of two that are nearest to each other before both vanish one is asked, if it has joined the other one there.
     """

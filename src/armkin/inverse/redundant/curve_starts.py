@@ -73,9 +73,10 @@ class Planes(NamedTuple):
 
 
 def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
-    """The planes of all targets, and the answers on them; which is whose, by plane and branch (N, V, B), -1: none.
+    """The planes of all targets, the answers on them, and the answer's number at each plane and branch (N, V, B).
 
-    owner: (M,) targets of answers that are postures (M, n) besides: each gets a plane; none without a closed form.
+    The number is -1 where there is no answer. postures: (M, n) further answers of targets owner (M,), for each of which
+    a plane is added; they are left out where the joint of the planes is the redundant one.
     """
     guide, values, N = nearly_closed(follower.arm, follower.redundant), over_a_turn(PLANES), len(follower.target)
     row, t = np.repeat(np.arange(N), PLANES), np.tile(values, N)
@@ -147,7 +148,7 @@ def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int)
 
 
 def _off_curves_at(follower: Follower, j: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
-    """Answers (M, n) off the curves with the joint at a value, and whose they are (M,)."""
+    """Targets (M,) and their answers (M, n) [rad | mm] that lie on no curve, with joint j held at a value [rad]."""
     held_arm = arm_without(follower.arm, ((follower.arm.joint_names[j], value),))
     s = follower.ik(held_arm, follower.target, follower.redundant.task.name, examine=False)
     target, branch = np.nonzero(s.valid)

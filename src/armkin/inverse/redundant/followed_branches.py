@@ -11,7 +11,7 @@ from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
 from armkin.inverse.redundant.interval_pieces import Pieces, none
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
-from armkin.inverse.redundant.samples import Changes, Runs, Summary, place_between, summary_of_samples, value_at
+from armkin.inverse.redundant.samples import Changes, SampleRuns, Summary, place_between, summary_of_samples, value_at
 from armkin.inverse.tasks.task import distance
 
 EVEN_SAMPLES = 180  # even samples of a turn of the redundant joint, besides all places where something may change
@@ -116,7 +116,7 @@ def _all_pieces(follower: Follower, summary: Summary) -> Pieces:
     return stack_rows(parts)
 
 
-def _of_runs(t: Array, runs: Runs, legal: bool, changes: Changes, ends: Array) -> Pieces:
+def _of_runs(t: Array, runs: SampleRuns, legal: bool, changes: Changes, ends: Array) -> Pieces:
     """The pieces that hold runs of samples at t (N, K); ends: where changes are."""
     K, sample = t.shape[1], runs.first + runs.best
     low, centre, high = (value_at(t, runs.row, sample + side) for side in (-1, 0, 1))

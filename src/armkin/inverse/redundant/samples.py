@@ -46,34 +46,34 @@ def value_at(t: Array, row: Int, k: Int) -> Array:
     return np.asarray(t[row, k] + 2 * np.pi * turns)
 
 
-class Gone(NamedTuple):
-    """Where branches end to be there (G,)."""
+class BranchEnds(NamedTuple):
+    """The G places along the redundant joint at which a branch appears or vanishes; each field has G rows."""
 
     at: Changes
-    twin: Int  # the branch that is nearest at the last sample
-    apart: Array  # (G, 2) its squared distance there, and a sample before
-    room: Array  # room to the limits there
+    twin: Int  # the other branch that is nearest at the last sample with the branch
+    apart: Array  # (G, 2) squared distance [rad^2] from the twin at that sample, and one sample before it
+    room: Array  # distance [rad | mm] from the limits at that sample
     legal: Bool
 
 
-class Crossed(NamedTuple):
-    """Where branches end to be legal (C,)."""
+class LimitCrossings(NamedTuple):
+    """The C places at which a branch turns legal or illegal, at a limit or where it ends; each field has C rows."""
 
     at: Changes
-    rooms: Array  # (C, 2) to the limits at the samples before and behind; nan where the branch is not there
+    rooms: Array  # (C, 2) distance [rad | mm] from the limits at the legal sample and the next; nan without the branch
 
 
-class Turns(NamedTuple):
-    """Between which samples limits may be crossed and crossed back (T,)."""
+class PossibleCrossings(NamedTuple):
+    """The T pairs of neighbouring samples between which a branch may cross a limit and come back."""
 
     row: Int
     k: Int
     branch: Int
-    rooms: Array  # (T, 2) to the limits at both
+    rooms: Array  # (T, 2) distance [rad | mm] from the limits at both samples
 
 
-class Runs(NamedTuple):
-    """Samples one after the other at which a branch is there, or legal (R,)."""
+class SampleRuns(NamedTuple):
+    """R runs of neighbouring samples at which a branch exists, or is legal; each field has R rows."""
 
     row: Int
     branch: Int
@@ -87,11 +87,11 @@ class Runs(NamedTuple):
 class Summary(NamedTuple):
     """All that samples of N targets show."""
 
-    gone: Gone
-    crossed: Crossed
-    turns: Turns
-    legal: Runs
-    there: Runs
+    gone: BranchEnds
+    crossed: LimitCrossings
+    turns: PossibleCrossings
+    legal: SampleRuns
+    there: SampleRuns
     hidden: Bool  # (N,) branches seem to be there between two values at which they are not
     lost: Bool  # (N,) none is there at any of them
     short: Bool  # (N,) no joint moves by REACH along any
@@ -136,9 +136,11 @@ def _summarise(sampled: Sampled, rows: Int, complete: bool) -> Summary:
         hidden = np.asarray(may_turn_back(misses, sampled.t).any(axis=(1, 2)))
     present = _runs(sampled, valid, rows)
     return Summary(
-        Gone(gone._replace(row=rows[gone.row]), twin, np.stack([gap, gap_back], axis=1), room[cells], legal[cells]),
-        Crossed(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
-        Turns(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
+        BranchEnds(
+            gone._replace(row=rows[gone.row]), twin, np.stack([gap, gap_back], axis=1), room[cells], legal[cells]
+        ),
+        LimitCrossings(crossed._replace(row=rows[crossed.row]), np.stack(rooms, axis=1)),
+        PossibleCrossings(rows[row], k, branch, np.stack([room[turns], room[row, (k + 1) % K, branch]], axis=1)),
         _runs(sampled, legal, rows),
         present,
         hidden,
@@ -159,7 +161,7 @@ def nearest_other(q: Array, branch: Int) -> tuple[Array, Int, Array]:
     return change[index, nearest], nearest, square[index, nearest]
 
 
-def _runs(sampled: Sampled, mask: Bool, rows: Int) -> Runs:
+def _runs(sampled: Sampled, mask: Bool, rows: Int) -> SampleRuns:
     """The runs of samples of a mask (S, K, B)."""
     K, B = mask.shape[1:]
     samples, legal = (flags.transpose(0, 2, 1).reshape(-1, K) for flags in (mask, sampled.legal))
@@ -168,7 +170,7 @@ def _runs(sampled: Sampled, mask: Bool, rows: Int) -> Runs:
     best_sample = best_samples(cost, curve, first, length) if len(curve) else first
     row, branch = curve // B, curve % B
     start = sampled.postures(row, (first + best_sample) % K)[np.arange(len(row)), branch]
-    return Runs(rows[row], branch, first, length, best_sample, start, ~holding_none(legal, curve, first, length))
+    return SampleRuns(rows[row], branch, first, length, best_sample, start, ~holding_none(legal, curve, first, length))
 
 
 def _all_short(sampled: Sampled, row: Int, first: Int, length: Int) -> Bool:

@@ -31,7 +31,7 @@ class Candidates(NamedTuple):
 class Components:
     """What components of the solution set the candidates of K targets lie on, as far as that was asked."""
 
-    def __init__(self, goals: Goals, candidates: Candidates, lost: newton.Lost, rests: Bool) -> None:
+    def __init__(self, goals: Goals, candidates: Candidates, lost: newton.LostDirections, rests: Bool) -> None:
         """rests: (K, M) those that no push takes along a self-motion."""
         self.goals, self.candidates = goals, candidates
         self.lost, self.rests = lost, rests

@@ -166,8 +166,12 @@ def _follow_spans(arm: Arm, task: Task, starts: _Start, curve: Structure, rows: 
 
 
 def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Bool, Array, Array]:
-    """Which curves (M,) stay at hand as far as their spans, how many times as long the next ones may be (M,), on which
-    of these no other crosses, and coefficients of x (NODES, M, n) and g (NODES, M, k)."""
+    """Fit polynomials of degree `NODES` - 1 to M curves along their spans.
+
+    Returns:
+        For each curve (M,) whether it stays at hand as far as its span, the length of the next span in spans, and
+        whether no other curve crosses it; then the coefficients of x (NODES, M, n) and g (NODES, M, k).
+    """
     n, rows, span = start.q.shape[1], start.u.shape[1], start.span
     holds, x, along_u, inverse = _solve_nodes(arm, task, start, side)
     # along the curve u turns: the inverse's last rows span what no motion across v reaches there
@@ -188,10 +192,13 @@ def _fit_polynomials(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[B
 
 
 def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool, Array, Array, Array]:
-    """Nodes of the curves of `_fit_polynomials`: which curves (M,) have all of them, the joints' ways (NODES, M, n),
-    the residual along u (NODES, M, k), and the inverses of the bordered Jacobians.
+    """Solve M curves at their nodes by Newton's method on the Jacobian bordered by u and v.
 
-    Newton's method on the Jacobian bordered by u and v (Keller, Numerical solution of bifurcation problems, 1977).
+    The method is that of Keller, Numerical solution of bifurcation problems, 1977.
+
+    Returns:
+        Whether all nodes of a curve are solved (M,), the joints' ways (NODES, M, n) [rad, reaches], the residual
+        along u (NODES, M, k), and the inverses of the bordered Jacobians (NODES, M, rows + 1, rows + 1).
     """
     q, target, u, v, w, span = start
     M, n = q.shape

@@ -28,7 +28,9 @@ THIRD = 0.03  # singular value of the third direction, which bends the curves by
 SPREAD = 5.0  # factor on that curvature in some direction: no surface of solutions, and the zeros are clear
 
 
-def separate(goals: Goals, q: Array, label: Int, size: Array, lost: newton.Lost) -> tuple[Array, Int, Array, Bool]:
+def separate(
+    goals: Goals, q: Array, label: Int, size: Array, lost: newton.LostDirections
+) -> tuple[Array, Int, Array, Bool]:
     """Candidates (K, M, n) with their labels and residuals (K, M), and postures of self-motions for those that meet.
 
     The first of a target, `near`, stays where it is. Others that no self-motion leaves stay, too: roots of high order,

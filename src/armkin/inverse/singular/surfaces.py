@@ -31,7 +31,7 @@ def list_swept(goals: Goals, decision: Examined) -> Examined:
 
 
 def no_more(target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
-    """Further candidates: none, those that were found are all."""
+    """The strategy `more` of `examine` that finds nothing: one posture of nan for each target, and no search."""
     return np.full((len(near), 1, near.shape[1]), np.nan), np.zeros(1, np.int64), np.zeros(len(near), bool)
 
 
