@@ -92,7 +92,7 @@ def test_manifolds_on_both_sides_of_a_straight_wrist_are_rows_of_their_own() -> 
     # with joint 4 held where it is, the others leave what they cannot take away
     across = way + 0.0
     for _ in range(12):
-        r, J = newton.scaled(arm, solutions.task, across, goals)
+        r, J = newton.scaled_residual_and_jacobian(arm, solutions.task, across, goals)
         step = np.linalg.pinv(np.delete(J, 3, axis=2), rcond=1e-10) @ r[:, :, None]
         across += np.insert(step[:, :, 0], 3, 0.0, axis=1)
     size = newton.misses(arm, solutions.task, across, goals)
@@ -172,7 +172,7 @@ def _least_misses(arm: armkin.Arm, T: Array, q: Array, joint: int, way: float) -
     for share in np.linspace(0.0, 1.0, 401):
         q[:, joint] = start + share * way
         for _ in range(6):
-            r, J = newton.scaled(arm, task, q, goals)
+            r, J = newton.scaled_residual_and_jacobian(arm, task, q, goals)
             step = np.linalg.pinv(np.delete(J, joint, axis=2), rcond=1e-7) @ r[:, :, None]
             q += np.insert(step[:, :, 0], joint, 0.0, axis=1)
         misses.append(newton.misses(arm, task, q, goals))

@@ -107,7 +107,7 @@ def test_a_little_beyond_a_stretched_arm_is_proved_unreachable(name: str, monkey
     for posture in np.random.default_rng(5).uniform(0.3, 0.7, (4, arm.n)):
         posture[2] = 0.0
         target = goal_of_joints(task, screw, posture[None]).array()
-        _, J = newton.scaled(arm, task, posture[None], target)
+        _, J = newton.scaled_residual_and_jacobian(arm, task, posture[None], target)
         U, S, _ = np.linalg.svd(J[0])
         assert S[-1] < 1e-9 < 1e-3 < S[-2]
         for size in (1e-6, 1e-5, 1e-4):

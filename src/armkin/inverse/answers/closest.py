@@ -160,7 +160,7 @@ def _target_features(arm: Arm, task: Task, target: Array) -> Array:
 
 def _weighted_residual(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Residual and Jacobian with lengths in units of the reach and angles weighing a quarter of it."""
-    r, J = newton.scaled(arm, task, q, target)
+    r, J = newton.scaled_residual_and_jacobian(arm, task, q, target)
     r[:, task.position :] *= 0.25
     J[:, task.position :] *= 0.25
     return r, J

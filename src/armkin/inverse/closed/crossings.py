@@ -29,7 +29,7 @@ def postures_beside(arm: Arm, task: Task, q: Array, target: Array) -> Array:
     N, steps, B, n = q.shape
     flat = q.reshape(-1, n)
     rows = np.flatnonzero(~np.isnan(flat).any(axis=1))
-    _, J = newton.scaled(arm, task, flat[rows], np.repeat(target, steps * B, axis=0)[rows])
+    _, J = newton.scaled_residual_and_jacobian(arm, task, flat[rows], np.repeat(target, steps * B, axis=0)[rows])
     rank = min(task.constraints, n)
     U, S, V = np.linalg.svd(J)
     size = np.full(len(flat), np.inf)

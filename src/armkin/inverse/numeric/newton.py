@@ -18,7 +18,7 @@ STEPS, PATIENCE = 25, 8  # Newton steps of a start at most; steps without gain a
 ROUND = np.pi / 4  # angle [rad] whose multiples roots of high order nearly always have: parallel axes, or such angles
 
 
-def scaled(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
+def scaled_residual_and_jacobian(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Array, Array]:
     """Residual (M, r) and Jacobian (M, r, n) with lengths in units of the arm's reach.
 
     Prismatic columns too: a joint value is then worth one radian or one reach.
@@ -65,7 +65,7 @@ def correct(
     active = np.arange(len(q))
     for k in range(steps + 1):
         if k < steps:
-            r, J = scaled(arm, task, q[active], target[active])
+            r, J = scaled_residual_and_jacobian(arm, task, q[active], target[active])
         else:
             r = residuals(arm, task, q[active], target[active])
         size = np.sqrt((r * r).sum(axis=1))
@@ -177,7 +177,7 @@ class Linear(NamedTuple):
     @classmethod
     def linearise(cls, arm: Arm, task: Task, q: Array, target: Array) -> Self:
         """The residuals and Jacobians of postures (M, n) and their targets."""
-        r, J = scaled(arm, task, q, target)
+        r, J = scaled_residual_and_jacobian(arm, task, q, target)
         return cls(r, *np.linalg.svd(J))
 
 
@@ -199,7 +199,7 @@ def lost_directions(arm: Arm, task: Task, q: Array, selected: Bool, target: Arra
     k, b = np.nonzero(selected)
     if not len(k):
         return LostDirections(sigma, nullity, V, Linear(none, none, none, none), place)
-    r, J = scaled(arm, task, q[k, b], target[k])
+    r, J = scaled_residual_and_jacobian(arm, task, q[k, b], target[k])
     if J.shape[1] == n == task.constraints:
         # the Frobenius norm of the inverse is no smaller than its largest singular value
         inverse = nudged(np.linalg.inv, J)

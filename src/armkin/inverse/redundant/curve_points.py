@@ -52,7 +52,7 @@ def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: 
         if not len(active):
             break
         part = slice(None) if len(active) == len(q) else active
-        residual, J = newton.scaled(arm, task, q[part], target[part])
+        residual, J = newton.scaled_residual_and_jacobian(arm, task, q[part], target[part])
         rows = np.concatenate([J, last[part, None]], axis=1)
         right = np.zeros((*rows.shape[:2], 2))
         right[:, :-1, 0], right[:, -1, 1] = residual, 1.0

@@ -88,7 +88,9 @@ class Traced(NamedTuple):
         """Postures (P, n) of pieces, moved onto their targets from where `at` leaves them, by steps of least norm."""
         follower, q = self.follower, q.copy()
         for _ in range(LAST):
-            residual, J = newton.scaled(follower.arm, follower.redundant.task, q, follower.target[pieces.row])
+            residual, J = newton.scaled_residual_and_jacobian(
+                follower.arm, follower.redundant.task, q, follower.target[pieces.row]
+            )
             weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), residual[:, :, None])
             q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
         return q

@@ -102,7 +102,7 @@ def _second_of_pairs(goals: Goals, doubted: Doubted, near_roots: Bool, decided: 
 
 
 def _bordered_inverses(goals: Goals, q: Array, beside: Array | None = None) -> tuple[Array, Array]:
-    """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled`.
+    """Inverses (M, rows, rows) of the Jacobians at q (M, n), scaled as in `newton.scaled_residual_and_jacobian`.
 
     One row more than columns is completed by a column `beside` (M, rows, 1), by default what no joint reaches.
     """

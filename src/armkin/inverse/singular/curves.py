@@ -95,7 +95,7 @@ def _onto_curve(arm: Arm, task: Task, q: Array, joints: Bool, target: Array) -> 
 
     Also right singular vectors there (M, n, n), the curve's first, second smallest singular values and misses (M,).
     """
-    r, J = newton.scaled(arm, task, q, target)
+    r, J = newton.scaled_residual_and_jacobian(arm, task, q, target)
     J = J * joints[:, None]
     L, V = np.linalg.eigh(np.swapaxes(J, 1, 2) @ J + np.where(joints[:, :, None], 0.0, np.eye(arm.n)))
     gain = np.where(L > tol.STEP_VALUE_SQUARED, 1.0 / np.maximum(L, tol.STEP_VALUE_SQUARED), 0.0)

@@ -78,7 +78,7 @@ def beyond_folds(arm: Arm, task: Task, q: Array, target: Array) -> Bool:
     """
     if not (task.constraints == arm.n > 1 and task.orientation != "axis" and len(q)):
         return np.zeros(len(q), bool)
-    r, J = newton.scaled(arm, task, q, target)
+    r, J = newton.scaled_residual_and_jacobian(arm, task, q, target)
     U, S, V = np.linalg.svd(J)
     u, step = U[:, :, -1], tol.FOLD_WAY * V[:, -1] * radian_or_reach(arm)
     ends = np.concatenate([q + step, q - step])

@@ -134,7 +134,7 @@ def _one_direction(goals: Goals, q: Array, listed: Bool, key: Int) -> Bool:
         if not len(k):
             break
         row, column = np.nonzero(listed[k] & (key[k] == key[k, m][:, None]))
-        _, J = newton.scaled(goals.arm, goals.task, q[k[row], column], goals.target[k[row]])
+        _, J = newton.scaled_residual_and_jacobian(goals.arm, goals.task, q[k[row], column], goals.target[k[row]])
         is_regular = np.bincount(row[np.linalg.svd(J, compute_uv=False)[:, -2] > tol.FOLD_VALUE], minlength=len(k)) > 0
         k, m, listed = k[~is_regular], m[~is_regular], np.ones_like(listed)
     regular = np.ones(len(q), bool)

@@ -213,7 +213,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
     for _ in range(ITERATIONS):
         part = active if len(active) < M else slice(None)  # numbers cost copies
         way, goal = x[:, part], np.concatenate([target[part]] * NODES)
-        r, J = newton.scaled(arm, task, (q[part] + way * unit).reshape(-1, n), goal)
+        r, J = newton.scaled_residual_and_jacobian(arm, task, (q[part] + way * unit).reshape(-1, n), goal)
         bordered[:, part, :rows, :n] = J.reshape(NODES, -1, rows, n)
         t_error = t[:, part] - (v[part] * way).sum(axis=2, keepdims=True)
         missing = np.concatenate([r.reshape(NODES, -1, rows), t_error], axis=2)

@@ -84,7 +84,7 @@ def _other_curves(goals: Goals, q: Array, label: Int, pair: Pair) -> tuple[Array
 def _jacobians(goals: Goals, q: Array) -> tuple[Array, Bool]:
     """Jacobians of postures (M, n) of one target, and the joints (M, n) that rest where several directions are lost."""
     arm, task, target, _ = goals
-    _, J = newton.scaled(arm, task, q, np.repeat(target, len(q), axis=0))
+    _, J = newton.scaled_residual_and_jacobian(arm, task, q, np.repeat(target, len(q), axis=0))
     S, V = np.linalg.svd(J)[1:]
     nullity = arm.n - (S > tol.WEAK).sum(axis=1)
     in_null = np.arange(arm.n) >= arm.n - nullity[:, None]

@@ -147,7 +147,7 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
     """
     unit, (M, n) = radian_or_reach(arm), q.shape
     middle, square = q.copy(), np.zeros(M)
-    _, J = newton.scaled(arm, task, middle, target)
+    _, J = newton.scaled_residual_and_jacobian(arm, task, middle, target)
     axis = np.linalg.svd(np.where(np.isfinite(J), J, 0.0))[2][:, -1]
     half_gap, size = axis.copy(), np.full(M, np.inf)
     active = np.arange(M)
@@ -155,7 +155,9 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
         goal, m = target[active], middle[active]
         u, w = half_gap[active], square[active]
         h = np.sqrt(np.maximum(np.abs(w), tol.PAIR_WAY**2))[:, None]
-        plus, minus, at_m = (newton.scaled(arm, task, m + side * h * u * unit, goal) for side in (1.0, -1.0, 0.0))
+        plus, minus, at_m = (
+            newton.scaled_residual_and_jacobian(arm, task, m + side * h * u * unit, goal) for side in (1.0, -1.0, 0.0)
+        )
         curvature = (plus[0] + minus[0] - 2.0 * at_m[0]) / h**2
         mean, slope = at_m[0] + 0.5 * w[:, None] * curvature, (plus[0] - minus[0]) / (2.0 * h)
         A, B = 0.5 * (plus[1] + minus[1]), (plus[1] - minus[1]) / (2.0 * h[:, :, None])

@@ -9,7 +9,7 @@ import numpy as np
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
-from armkin.inverse.numeric.newton import scaled
+from armkin.inverse.numeric.newton import scaled_residual_and_jacobian
 from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.keep_out.clearance import clearance
@@ -84,7 +84,7 @@ def _steps_carried(
     last_slowness, near_singularity = np.inf, False  # an arm that starts near a singularity may move away from it
     for step_number in range(1, max_steps + 1):
         goal = _shift_target(arm, task, q, axis, frame, step * step_number)[None]
-        residual, J = scaled(arm, task, posture[None], goal)
+        residual, J = scaled_residual_and_jacobian(arm, task, posture[None], goal)
         change = np.linalg.lstsq(J[0], residual[0], rcond=1e-9)[0]
         # no joint motion moves the tip this way
         is_blocked = np.linalg.norm(J[0] @ change - residual[0]) > 0.1 * np.linalg.norm(residual[0])
@@ -95,9 +95,9 @@ def _steps_carried(
         last_slowness, near_singularity = slowness, slowness > 1.0
         posture = posture + joint_step
         for _ in range(3):
-            residual, J = scaled(arm, task, posture[None], goal)
+            residual, J = scaled_residual_and_jacobian(arm, task, posture[None], goal)
             posture = posture + np.linalg.lstsq(J[0], residual[0], rcond=1e-9)[0] * unit
-        if not float(np.abs(scaled(arm, task, posture[None], goal)[0]).max()) < 1e-7:
+        if not float(np.abs(scaled_residual_and_jacobian(arm, task, posture[None], goal)[0]).max()) < 1e-7:
             return step_number - 1, "it is out of reach" if step_number > 1 else "a singularity is near"
         if stop_text := _stop_reason(arm, posture, starts_in_hit):
             return step_number - 1, stop_text
