@@ -3,19 +3,33 @@
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
-
-import typer
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import armkin
 from armkin import files
 from armkin.cli.boards import board_link, keep_outs
 from armkin.cli.boards.board_link import SIM, Assume, Baud, Link, NoReset, Resume
 from armkin.cli.boards.keep_outs import Ignore, NoScene
-from armkin.cli.parsing import arguments, drawing_path, lock_and_sweep
+from armkin.cli.parsing import arguments, drawing_path, lock_and_sweep, path_options
 from armkin.cli.parsing.drawing_path import At, Feed, GripBy, Lift, Placement, Scale
-from armkin.cli.parsing.number_parsing import comma_separated, number, whole_number
+from armkin.cli.parsing.number_parsing import comma_separated
 from armkin.cli.parsing.options import BranchName, Json, Lock, Near, Picture, Robot, Scene, Speed, TaskName, Tool
+from armkin.cli.parsing.path_options import (
+    AccelShare,
+    BlendRadius,
+    Corner,
+    CornersBy,
+    FirstTargets,
+    GreatestJerk,
+    MaySplit,
+    MovePort,
+    OnlyPlan,
+    PathSource,
+    PlanOut,
+    StandsAt,
+    Tolerance,
+    ToolSpeed,
+)
 from armkin.cli.printing import output, path_text, render
 from armkin.columns.csv_cells import csv_line
 from armkin.errors import NoSolutionError, UsageError
@@ -27,52 +41,6 @@ if TYPE_CHECKING:
     from armkin.motion.plan.path_plan import PathPlan
 
 _ROW_PERIOD = 0.01  # time [s] between the rows of --out
-
-PathSource = Annotated[
-    str | None, typer.Argument(metavar="[FILE|-]", help="A path file (YAML), waypoints as CSV, G-code or SVG.")
-]
-Corner = Annotated[
-    list[str] | None,
-    typer.Option("--via", metavar="X,Y,Z", help="Instead of a file: a waypoint on straight lines. Repeatable."),
-]
-MovePort = Annotated[
-    str | None,
-    typer.Option("--port", "-p", metavar="PORT", help="Move: to the start by a joint move, then along the path."),
-]
-OnlyPlan = Annotated[bool, typer.Option("--dry-run", help="Plan and report; nothing moves, whatever --port says.")]
-Tolerance = Annotated[
-    str | None,
-    typer.Option("--tolerance", metavar="MM", help="Greatest distance between plan and path. [default: 0.05]"),
-]
-BlendRadius = Annotated[
-    str | None, typer.Option("--blend", metavar="MM", help="Radius that rounds corners; 0 stops in them.")
-]
-CornersBy = Annotated[
-    str | None,
-    typer.Option(
-        "--corners",
-        metavar="stop|blend|tolerance",
-        help="How corners are passed; tolerance: dense points as one curve.",
-    ),
-]
-AccelShare = Annotated[str, typer.Option("--accel", metavar="PERCENT", help="Of every joint's max_accel.")]
-ToolSpeed = Annotated[str | None, typer.Option("--tool-speed", metavar="MM/S", help="Greatest speed of the tool.")]
-GreatestJerk = Annotated[
-    str | None,
-    typer.Option("--jerk", metavar="DEG/S3", help="Greatest jerk of every joint. [default: its max_jerk]"),
-]
-StandsAt = Annotated[
-    str | None,
-    typer.Option("--start", metavar="Q,...", help="Where the arm stands, for a plan. [default: the home pose]"),
-]
-MaySplit = Annotated[bool, typer.Option("--split", help="Where no branch carries on, change it there by a joint move.")]
-FirstTargets = Annotated[
-    str | None, typer.Option("--samples", metavar="N", help="Targets solved at first. [default: one a mm]")
-]
-PlanOut = Annotated[
-    str | None,
-    typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
-]
 
 
 def path(
@@ -127,7 +95,7 @@ def path(
     drawing_moves = drawing_path.drawing_moves(locked_arm, file, task, placement)
     moves = _moves_of(locked_arm, file, via, task) if drawing_moves is None else drawing_moves
     output.check_destination(out, "a plan is", ".csv")
-    numbers = _path_numbers(
+    numbers = path_options.path_numbers(
         arm, tolerance=tolerance, blend=blend, speed=speed, accel=accel, tool_speed=tool_speed, jerk=jerk, near=near,
         samples=samples,
     )  # fmt: skip
@@ -145,31 +113,6 @@ def path(
         return
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     _carry_out_path(question, link, out, plot, json=json)
-
-
-def _path_numbers(
-    arm: Arm,
-    *,
-    tolerance: str | None,
-    blend: str | None,
-    speed: str,
-    accel: str,
-    tool_speed: str | None,
-    jerk: str | None,
-    near: str | None,
-    samples: str | None,
-) -> dict[str, Any]:
-    """Options that are numbers, as `armkin.path` takes them. Raises UsageError for one out of range."""
-    return {
-        "tolerance": None if tolerance is None else _number_from(tolerance, "--tolerance", 1e-6),
-        "blend": None if blend is None else _number_from(blend, "--blend", 0),
-        "speed": arguments.percent(speed, "--speed"),
-        "accel": arguments.percent(accel, "--accel"),
-        "tool_speed": None if tool_speed is None else _number_from(tool_speed, "--tool-speed", 1e-3),
-        "jerk": None if jerk is None else units.joints_in(arm, [_number_from(jerk, "--jerk", 1e-3)] * arm.n),
-        "near": None if near is None else units.joints_in(arm, arguments.joint_list(arm, near, "--near")),
-        "samples": None if samples is None else whole_number(samples, "--samples", 10, 1_000_000),
-    }
 
 
 class _Question(NamedTuple):
@@ -276,13 +219,6 @@ def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:
     """`--via X,Y,Z`, or with the rest of the target."""
     position_labels = labels[: 2 if labels[2:3] != ("z",) else 3]
     return comma_separated(text, position_labels if text.count(",") + 1 == len(position_labels) else labels, "--via")
-
-
-def _number_from(text: str, option: str, minimum: float) -> float:
-    value = number(text, option)
-    if value < minimum:
-        raise UsageError(f"{option}: '{text}' must be at least {minimum:g}")
-    return value
 
 
 def _make_plan(question: _Question, *, json: bool) -> PathPlan:
