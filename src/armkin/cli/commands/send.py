@@ -119,7 +119,7 @@ def send(
         board_link.can_resume({"--dry-run": dry_run, "--assume": assume, "--port sim": port == SIM})
     link = Link(port, baud, assume, resume, reset=not no_reset, no_scene=no_scene)
     if path is not None:
-        from armkin.cli.commands.path import send_path
+        from armkin.cli.boards.carry_out_path import send_path
 
         other_options = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
         arm = keep_outs.load_moving_arm(

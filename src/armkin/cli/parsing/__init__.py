@@ -9,7 +9,7 @@ unit_notes.py        notes on numbers that look like metres or radians
 row_chunks.py        rows of numbers in chunks
 csv_to_numbers.py    rows from CSV
 piped_answers.py     answers of another command on standard input
-path_options.py      options of `path`, and its numbers
+path_options.py      options of `path`, its moves and numbers
 drawing_path.py      drawings as paths: G-code and SVG
 lerobot_zero.py      the calibration file of `zero --from`
 """

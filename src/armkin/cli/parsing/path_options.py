@@ -1,4 +1,4 @@
-"""Options of `armkin path`, and those of them that are numbers as `armkin.path` takes them."""
+"""Options of `armkin path`, and its moves and numbers as `armkin.path` takes them."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from armkin import files
 from armkin.cli.parsing import arguments
-from armkin.cli.parsing.number_parsing import number, whole_number
+from armkin.cli.parsing.number_parsing import comma_separated, number, whole_number
 from armkin.errors import UsageError
 from armkin.model import units
 
@@ -59,6 +60,31 @@ PlanOut = Annotated[
     str | None,
     typer.Option("--out", "-o", metavar="FILE|-", help="The plan as CSV: joints over time; whole or not at all."),
 ]
+
+
+def path_moves(arm: Arm, file: str | None, via: list[str] | None, task: str | None) -> Any:
+    """The moves as `armkin.path` takes them."""
+    from armkin import path_file
+
+    if (file is None) == (not via):
+        raise UsageError("give a path file, or corners with --via X,Y,Z --via X,Y,Z: one of the two")
+    if via:
+        from armkin.inverse.tasks.choose_task import task_for
+
+        labels = task_for(arm, task).labels
+        first, *later_corners = [_corner_values(text, labels) for text in via]
+        return path_file.validate_path({"moves": [{"point": first}, *({"line": corner} for corner in later_corners)]})
+    assert file is not None
+    if file == "-":
+        return path_file.parse_path_file(arguments.standard_input(path_file.MAX_BYTES), "standard input")
+    files.protect_input(file)
+    return path_file.read_path_file(file)
+
+
+def _corner_values(text: str, labels: tuple[str, ...]) -> list[float]:
+    """`--via X,Y,Z`, or with the rest of the target."""
+    position_labels = labels[: 2 if labels[2:3] != ("z",) else 3]
+    return comma_separated(text, position_labels if text.count(",") + 1 == len(position_labels) else labels, "--via")
 
 
 def path_numbers(
