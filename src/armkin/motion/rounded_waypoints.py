@@ -68,7 +68,7 @@ def round_waypoints(
 
 
 def _rounded_way(corners: Array, blend: float) -> Knots:
-    """The rounded polyline as knots; corners: (w, n), each different from the one before."""
+    """The knots of the polyline through corners (w, n), no two neighbours equal, that parabolas round by `blend`."""
     side = np.diff(corners, axis=0)
     length = np.linalg.norm(side, axis=1)
     direction = side / length[:, None]

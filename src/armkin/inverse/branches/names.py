@@ -56,7 +56,7 @@ def branch_names(arm: Arm, task: Task, geometry: Geometry, count: int) -> tuple[
 
 
 def _swapped_names(arm: Arm, task: Task, geometry: Geometry, sizes: list[int]) -> dict[str, Bool]:
-    """The branches (b0, b1, b2) on which the first sign has the second word, for each branch axis."""
+    """For the label of each branch axis, which branches (b0, b1, b2) give its first sign the second of its words."""
     postures, q, valid = _sample_postures(arm, task, geometry)
     shape = (len(q), *sizes)
     distances = np.where(valid, newton.wrapped_distance(arm, q, postures[:, None, :]), np.inf)

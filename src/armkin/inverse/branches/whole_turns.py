@@ -73,7 +73,7 @@ def nearest_copy(  # noqa: C901 - one pass over a batch's arrays, which stay in 
 
 
 def _half_turned(value: Array, near: Array | float, low: float, high: float) -> Array:
-    """Principal values, with half a turn as the legal and nearer of its two copies."""
+    """Put -pi for principal values [rad] of half a turn where -pi alone is legal, or legal and nearer to `near`."""
     if value.max(initial=0.0) <= np.pi - SLACK:
         return value
     indices = np.flatnonzero(value > np.pi - SLACK)
@@ -90,7 +90,7 @@ def _half_turned(value: Array, near: Array | float, low: float, high: float) -> 
 def nearest_number(  # noqa: C901 - of every joint and branch of a pose alone: a call more would be felt
     value: float, near: float, lower: float, upper: float, slides: bool
 ) -> tuple[float, bool]:
-    """`nearest_copy` of one number, with the same operations; a prismatic joint has no copies.
+    """Return what `nearest_copy` returns, for one joint value [rad | mm] and by the same operations.
 
     >>> nearest_number(3.0, -2.0, -4.0, 4.0, False) == (3.0 - TURN, True)
     True

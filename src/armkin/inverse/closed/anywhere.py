@@ -155,7 +155,7 @@ class _Loop:
 
     @classmethod
     def of(cls, chain: Chain, first: int, tolerance: float, reach: float) -> "_Loop | None":
-        """The loop, if the three axes from the first one on are parallel or meet; None if they do neither."""
+        """The loop if the axes of joints `first` to `first` + 2 are parallel, or meet and `first` is 1; else None."""
         L1, L2 = chain.link[first + 1], chain.link[first + 2]
         if is_parallel(L1, tolerance) and is_parallel(L2, tolerance):
             return cls(chain, first, reach, None, tolerance)

@@ -109,11 +109,14 @@ class Recorded:
         return np.moveaxis(rows[:-3], 0, 2), miss, np.asarray((edge > 0).any(axis=1))
 
     def others(self, target: Array, near: Array, lost: Bool) -> tuple[Array, Int, Bool]:
-        """Further candidates of targets with free joints or without a branch: (N, M, n), and branches (M,).
+        """Find further candidates of targets that have free joints or have lost branches (N,); near: (N, n).
 
-        For targets with lost branches (N,), the candidates have other values of free joints, or belong to slightly
-        shifted targets without free joints. For all targets they include the places where two self-motions meet. nan
-        for none, or far from the target. near: (N, n). Also which targets (N,) may still lack branches.
+        For lost branches the candidates have other values of free joints, or belong to slightly shifted targets without
+        free joints. For all targets they include the places where two self-motions meet.
+
+        Returns:
+            Candidates (N, M, n) [rad | mm], nan for none or one far from the target; their branches (M,); and which
+            targets (N,) may still lack branches.
         """
         q, miss = self._at_shifts(target, near, ROUND)
         if not (lost.any() or (q[:, 1:] != q[:, :1]).any()):  # no free joint, so no self-motion

@@ -66,7 +66,7 @@ def one_per_circuit(arm: Arm, q: Array, near: Array) -> tuple[Bool, Array]:
     """Choose one posture of q (N, S, B, n), nan for none, for each circuit of a four-bar linkage.
 
     near: (N, n). The S postures of a column are on one self-motion of the joints that differ. Returns (N, S, B) which
-    postures are kept: all except those on linkages that are not the nearest to `near` on their circuit. Also (N, B, n)
+    postures are kept, all except those on linkages that are not the nearest to `near` on their circuit, and (N, B, n)
     a posture of each linkage, nan in its moving joints and where there is none.
     """
     N, _, B, n = q.shape

@@ -306,7 +306,7 @@ def _absolute_sum(values: Sequence[Entry]) -> Entry:
 
 
 def _lines_of_conic(conic: Conic, x: Entry) -> tuple[list[Entry], ...]:
-    """The two lines (lx, ly, lz), lx cos q + ly sin q + lz = 0, of a conic that degenerates with x times the circle."""
+    """The two lines lx cos q + ly sin q + lz = 0 that make up a conic plus x times the unit circle: (lx, ly, lz)."""
     a, b, u, v, w = conic
     M = [[x + a, b, u], [b, x - a, v], [u, v, w - x]]
     # M + [p] = l m^T, of rank one, with p p^T = -adj(M) (p is where the lines l and m meet)

@@ -162,7 +162,7 @@ class Position:
         return third, second, doubt | doubt2
 
     def _rank_one(self, sides: list[Entry], size: Entry, prefer: Prefer) -> tuple[Pair, Pair, Doubt]:
-        """Joint 3 from the combination of the equations with only q3, joint 2 from the other; A of rank one."""
+        """Solve for joints 2 and 3 where A has rank one: one combination of the equations holds q3 alone, one both."""
         alone = self._affine(self.alone, sides)
         if self.prismatic[2]:
             d, doubt = sub.quadratic(alone[3], alone[1], alone[0], 0, size, tol.NO_SIZE * size, prefer[2])

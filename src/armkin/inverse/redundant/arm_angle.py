@@ -244,7 +244,7 @@ class Turning(NamedTuple):
 
 
 def _pieces(srs: ArmAngle, circles: _Circles, near: Array) -> Pieces:
-    """All pieces of circles M, near (M, n); their starts are not filled in."""
+    """All pieces of M circles, by the cost of their samples from near (M, n) [rad]; each start (n,) is left zero."""
     samples = _samples(srs, circles, near)
     M, K = samples.rises.shape
     curve, begin, count, legal = _spans(samples)

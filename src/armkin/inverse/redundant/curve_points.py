@@ -43,7 +43,7 @@ def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: 
 
 
 def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float) -> Points:
-    """Postures moved as `onto_curves` does, so few that they stay in the cache."""
+    """Move at most `AT_ONCE` postures q (M, n) [rad | mm], which the cache holds, onto curves as `onto_curves` does."""
     arm, task, unit = follower.arm, follower.redundant.task, radian_or_reach(follower.arm)
     target = follower.target[row]
     q, tangent = q.copy(), last.copy()
@@ -90,7 +90,7 @@ class Ways(NamedTuple):
         return np.asarray(self.q + offset * radian_or_reach(follower.arm))
 
     def slope(self, share: Array | float, j: int) -> Array:
-        """How joint j changes there (M,)."""
+        """The derivative (M,) [rad, reaches] of joint j by the share of the way, at shares (M,) or one."""
         u = share
         ends = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
         return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + ends)

@@ -167,7 +167,7 @@ def _seeds(arm: Arm, box: Box, target: Array, near: Array) -> tuple[Array, Int]:
 
 
 def _farthest_apart(arm: Arm, q: Array) -> Array:
-    """STARTS of postures (N, K, n), each the one farthest from those taken before: small basins get one, too."""
+    """Choose STARTS of postures (N, K, n), each the farthest from those before, so that small basins get one, too."""
     u = q / arm.reach * np.pi
     places = np.concatenate([np.where(arm.prismatic, u, np.cos(q)), np.where(arm.prismatic, 0.0, np.sin(q))], axis=2)
     rows = np.arange(len(q))

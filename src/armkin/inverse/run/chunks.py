@@ -39,7 +39,7 @@ class Solved(NamedTuple):
 
 
 def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, examine: bool, workers: int) -> Solved:
-    """All branches of targets, whose poses need not have been read yet; common: (n,) `near`, if one serves all."""
+    """Solve targets, poses as they were given, for all branches; common: (n,) [rad | mm] `near`, if one serves all."""
     arm, task, raw, near = goals
     runner, N = recorded_formula(arm, task, geometry), len(raw)
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts, which can share buffers
@@ -136,7 +136,7 @@ def _write_branches(arm: Arm, part: Batch, shape: tuple[int, ...], values: list[
 
 
 def _on_edge(doubt: Any, miss: Array, valid: Bool | None) -> Int:
-    """The targets that are in doubt or have a branch that nearly solves; miss, valid: (B, N); valid None: all valid."""
+    """The targets (D,) in doubt, or with an invalid branch that nearly solves; miss, valid: (B, N); None: all valid."""
     N = miss.shape[1]
     if np.shape(doubt)[-1:] != (N,):
         doubt = np.broadcast_to(doubt, (*np.shape(doubt)[:-1], N))

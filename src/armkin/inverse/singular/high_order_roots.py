@@ -40,9 +40,9 @@ def solves_between(arm: Arm, task: Task, q: Array, offset: Array, miss: Array, s
 def equal_candidates(
     arm: Arm, task: Task, q: Array, k: Int, b: Int, sigma: Array, size: Array, target: Array
 ) -> tuple[Bool, Array]:
-    """Which candidates are one with the b-th of their target, and how far they are from it: (k, M).
+    """Which candidates of targets k (m,) equal the b-th (m,), and how far they are from it [rad, reaches]: (m, M).
 
-    Those that rounding explains, and those between which and it the posture in the middle solves the target.
+    Two are equal if rounding explains their distance, or if the posture halfway between them solves the target.
     """
     distance = newton.wrapped_distance(arm, q[k], q[k, b][:, None])
     alike = distance < _rounding_radius(np.minimum(sigma[k], sigma[k, b][:, None]))

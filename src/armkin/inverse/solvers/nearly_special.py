@@ -183,7 +183,7 @@ def _by_neighbours(
 
 
 def _corrected_seeds(arm: Arm, task: Task, q: Array, target: Array, places: int) -> Array:
-    """Seeds (N, B, n) moved onto the arm: the first `places` in their places, then what else they lead to, once."""
+    """Correct seeds (N, B, n) [rad | mm]; failed and repeated ones are nan in columns up to `places`, else left out."""
     N, B, n = q.shape
     seeds, goals = q.reshape(-1, n).copy(), np.repeat(target, B, axis=0)
     hopeful = np.flatnonzero(newton.misses(arm, task, seeds, goals) < tol.HOPELESS)

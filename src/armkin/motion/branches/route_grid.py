@@ -98,7 +98,7 @@ def _nearest_indices(ordered: Array, values: Array) -> Int:
 
 
 def _initial_grid(arm: Arm, branch: BranchSamples, number: int, min_points: int) -> tuple[Array, Int]:
-    """Grid points spaced by length and joint motion, and the indices of the breaks among them."""
+    """Grid lengths (M,) [mm], spaced by length and joint motion, and the indices (K,) of the breaks among them."""
     s, a, b = branch.s, branch.begin, branch.end
     edges = _section_edges(branch)
     motion_by_s = _accumulate_motion(arm, branch.q)

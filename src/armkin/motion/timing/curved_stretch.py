@@ -75,7 +75,7 @@ class Curve:
         return CurvePlaces(i, np.clip(tau * (v + tau * u / 2), 0.0, self.path.h[i]), np.maximum(v + tau * u, 0.0), u)
 
     def lengths(self, t: Array) -> Array:
-        """s at times t: (T,) -> (T,)."""
+        """The path parameter s at times t [s] since the beginning: (T,) -> (T,)."""
         place = self.locate(t)
         return np.asarray(self.path.s[place.interval] + place.offset)
 

@@ -31,7 +31,7 @@ class Chords:
 
     @cached_property
     def u(self) -> Array:
-        """Sum of the chords before every point: (N,)."""
+        """The length of the polygon from its first point to each point: (N,)."""
         return np.concatenate([[0.0], np.cumsum(self.length)])
 
     @cached_property

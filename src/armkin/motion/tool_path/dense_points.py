@@ -130,7 +130,7 @@ class _Spots:
         return _Spots(task, positions, np.concatenate([first.sums[None], sums])[last_full], orientations)
 
     def spot(self, k: int) -> Spot:
-        """The spot of point k."""
+        """The position, angle sums and orientation of point k as a `Spot`."""
         return Spot(self.positions[k], self.sums[k], None if self.orientations is None else self.orientations[k])
 
     def relative_values(self, a: int, b: int) -> Array | None:

@@ -89,11 +89,11 @@ class _Cubics(NamedTuple):
     powers: Array  # (M, 4, d) coefficients over the fraction of each
 
     def take(self, selection: Bool | Int) -> _Cubics:
-        """Some of the cubics."""
+        """The cubics that a mask (M,) or indices (K,) select."""
         return _Cubics(self.begin[selection], self.end[selection], self.powers[selection])
 
     def chord(self, chords: Chords) -> Int:
-        """The chord (M,) that the middle of each lies on."""
+        """The number of the chord that the middle of each cubic lies on: (M,)."""
         return np.asarray(np.searchsorted(chords.u, (self.begin + self.end) / 2) - 1)
 
 

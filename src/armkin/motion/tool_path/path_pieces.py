@@ -72,7 +72,7 @@ def split_target(task: Task, target: ArrayLike) -> Spot:
 
 
 def turn_between(task: Task, a: Spot, b: Spot) -> Array:
-    """Rotation vector from one orientation to another."""
+    """The rotation vector (3,) [rad] that takes the orientation of a to that of b, zero for a task without one."""
     if a.orientation is None or b.orientation is None:
         return np.zeros(3)
     if task.orientation == "full":

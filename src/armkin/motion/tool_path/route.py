@@ -71,7 +71,7 @@ class Route:
 
     @cached_property
     def largest_detour(self) -> float:
-        """The largest displacement of its detours [mm]."""
+        """The largest displacement of the route's detours [mm], 0 without a detour."""
         return max((float(np.linalg.norm(detour.displacement)) for detour in self.detours), default=0.0)
 
     @cached_property
