@@ -93,23 +93,33 @@ def _list_branches(
     within_limits, is_free = answers.within_limits[block], answers.is_free[block]
     allowed = is_free if request.branch is None else is_free & np.isin(solutions.branch[block], answers.names)
     if all_branches:
-        is_unsolved, motion = ~_any_column(allowed), _joint_motion(q, answers.near, scale)
+        motion = _joint_motion(q, answers.near, scale)
         key = np.where(valid, motion.round(EQUAL_DECIMALS), np.inf)
-        count = valid.sum(axis=1)
-        lines = np.maximum(count, 1)
-        target = np.repeat(np.arange(len(lines)), lines)
-        has_branch = np.repeat(count > 0, lines)
-        rank = numbers_within(lines)
-        branch = _rank_branches(key, valid, within_limits, is_free)[target[has_branch], rank[has_branch]]
-        motion = motion[target[has_branch], branch]
+        lines = _lines_of_all(q, motion, within_limits, valid, _rank_branches(key, valid, within_limits, is_free))
+        is_unsolved = ~_any_column(allowed)
     else:
         arguments = q, allowed, answers.near, scale
         nearest, motion = (nearest_in_c and nearest_in_c(*arguments)) or nearest_branches(*arguments)
-        target, has_branch = np.arange(len(nearest)), nearest >= 0
-        is_unsolved, branch, motion = ~has_branch, nearest[has_branch], motion[has_branch]
-    branch_of_line = target[has_branch], branch
-    values = _Lines(target, has_branch, q[branch_of_line], within_limits[branch_of_line], motion, *branch_of_line)
-    return BranchTable(_branch_table(request, solutions, rows[block], block, values), is_unsolved)
+        is_unsolved, lines = nearest < 0, _lines_of_nearest(q, motion, within_limits, nearest)
+    return BranchTable(_branch_table(request, solutions, rows[block], block, lines), is_unsolved)
+
+
+def _lines_of_all(q: Array, motion: Array, within_limits: Bool, valid: Bool, ranked: NDArray[np.intp]) -> _Lines:
+    """Lines of all branches q (N, B, n) that are valid (N, B), in the order ranked (N, B); one of a target without."""
+    count = valid.sum(axis=1)
+    lines = np.maximum(count, 1)
+    target, has_branch = np.repeat(np.arange(len(lines)), lines), np.repeat(count > 0, lines)
+    row = target[has_branch]
+    branch = ranked[row, numbers_within(lines)[has_branch]]
+    return _Lines(target, has_branch, q[row, branch], within_limits[row, branch], motion[row, branch], row, branch)
+
+
+def _lines_of_nearest(q: Array, motion: Array, within_limits: Bool, nearest: NDArray[np.intp]) -> _Lines:
+    """A line of each target, with its nearest branch (N,) of q (N, B, n), -1 for none; motion: (N,) to that one."""
+    has_branch = nearest >= 0
+    row, branch = np.flatnonzero(has_branch), nearest[has_branch]
+    legal, target = within_limits[row, branch], np.arange(len(nearest))
+    return _Lines(target, has_branch, q[row, branch], legal, motion[has_branch], row, branch)
 
 
 def nearest_branches(q: Array, candidates: Bool, near: Array, scale: Array) -> tuple[NDArray[np.intp], Array]:

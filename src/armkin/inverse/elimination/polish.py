@@ -96,6 +96,13 @@ def jacobian(frame: Array, joints: Array, prismatic: Bool) -> Array:
     return J
 
 
+def _damped_inverse(J: Array, size: Array) -> Array:
+    """What gives Levenberg-Marquardt steps of Jacobians J (M, 6, 6), damped by what is missed (M,): (M, 6, 6)."""
+    transposed, damping = np.swapaxes(J, 1, 2), size * np.minimum(size, 1.0)
+    normal = np.matmul(transposed, J) + damping[:, None, None] * np.eye(6)
+    return np.asarray(np.matmul(nudged(np.linalg.inv, normal), transposed))
+
+
 def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damped: bool = False) -> Polished:
     """Newton steps (Levenberg-Marquardt ones if ``damped``), keeping the best point met.
 
@@ -127,15 +134,11 @@ def refine(link: Array, prismatic: Bool, q: Array, goal: Array, steps: int, damp
         if stale.size:
             rows = slice(None) if stale.size == active.size else stale
             square = jacobian(frame[..., rows], joints[..., rows], prismatic)
-            new_inverse = nudged(np.linalg.inv, square)
             index = active[rows]
-            weakness[index] = np.sqrt(np.einsum("mij,mij->m", new_inverse, new_inverse))
+            inverse[index] = nudged(np.linalg.inv, square)
+            weakness[index] = np.sqrt(np.einsum("mij,mij->m", inverse[index], inverse[index]))
             if damped and step < steps - 2:
-                transposed = np.swapaxes(square, 1, 2)
-                damping = size[rows] * np.minimum(size[rows], 1.0)
-                normal = np.matmul(transposed, square) + damping[:, None, None] * np.eye(6)
-                new_inverse = np.matmul(nudged(np.linalg.inv, normal), transposed)
-            inverse[index] = new_inverse
+                inverse[index] = _damped_inverse(square, size[rows])
         is_open = size > tol.CONVERGED if step < steps else (size > 10 * tol.CONVERGED) & (size < tol.SLOW_DISTANCE)
         pending = np.flatnonzero(is_open)
         if step == max_steps or pending.size == 0:

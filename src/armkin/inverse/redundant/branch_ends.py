@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Int
+from armkin.formula.arrays import Array, Bool, Int
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.interval_pieces import golden_section, margin
 from armkin.inverse.redundant.other_joints import Follower
@@ -45,42 +45,61 @@ class _Ends:
 
         By secants: across the end where the branch is there on both sides, else from the side where it is.
         """
-        lo, hi, last = valid.copy(), invalid.copy(), previous.copy()
-        at_lo, at_hi, at_last = np.maximum(rooms[0], tol.TINY), rooms[1].copy(), rooms[2].copy()
-        value, active = 0.5 * (lo + hi), np.arange(len(lo))
-        overshot, side = np.zeros(len(lo), bool), np.zeros(len(lo), bool)
+        bracket = _Bracket(valid, invalid, previous, rooms)
+        value, active = 0.5 * (valid + invalid), np.arange(len(valid))
         for k in range(HALVINGS):
-            low, high = lo[active], hi[active]
-            a, b, c = at_lo[active], at_hi[active], at_last[active]
-            with np.errstate(invalid="ignore", divide="ignore"):
-                secant = low + (high - low) * a / (a - b)
-                extrapolated = low + (low - last[active]) * a / (c - a)
-                guess = np.where(b <= 0, secant, extrapolated)
-                fits = ((guess - low) * (high - guess) > 0) & ~overshot[active] & (k < SECANTS)
-            step = np.where(fits, np.abs(guess - value[active]), np.abs(high - low))
-            # where a secant along the branch has gone past the end, the end is close by
-            guess = np.where(fits, guess, np.where(overshot[active], high - BACK * (high - low), 0.5 * (low + high)))
-            value[active] = np.where(b == 0, high, np.where(fits | ~overshot[active], guess, value[active]))
-            keep = (step > tol.SAME_END) & (b != 0)
+            guess, fits = bracket.guess(active, may_be_secant=k < SECANTS)
+            width = np.abs(bracket.high[active] - bracket.low[active])
+            step, at_high = np.where(fits, np.abs(guess - value[active]), width), bracket.at_high[active]
+            moves = fits | ~bracket.overshot[active]
+            value[active] = np.where(at_high == 0, bracket.high[active], np.where(moves, guess, value[active]))
+            keep = (step > tol.SAME_END) & (at_high != 0)
             active, guess, fits = active[keep], guess[keep], fits[keep]
             if not len(active):
                 break
             room = self.room_at(active, guess)
             keep = ~(np.abs(room) < tol.NO_ROOM)
-            active, guess = active[keep], guess[keep]
-            fits, room = fits[keep], room[keep]
-            is_valid = room > 0
-            overshot[active] = fits & np.isnan(room)
-            # the Illinois rule: the value of an end that has stayed twice is halved
-            at_hi[active[is_valid & side[active]]] *= 0.5
-            at_lo[active[~is_valid & ~side[active]]] *= 0.5
-            side[active] = is_valid
-            rows = active[is_valid]
-            last[rows], at_last[rows] = lo[rows], at_lo[rows]
-            lo[rows], at_lo[rows] = guess[is_valid], room[is_valid]
-            rows = active[~is_valid]
-            hi[rows], at_hi[rows] = guess[~is_valid], room[~is_valid]
+            active = active[keep]
+            bracket.narrow(active, guess[keep], room[keep], fits[keep])
         return value
+
+
+class _Bracket:
+    """Values low and high (M,) between which ends are, valid and not; last, the value before low; the rooms there."""
+
+    def __init__(self, valid: Array, invalid: Array, previous: Array, rooms: tuple[Array, Array, Array]) -> None:
+        self.low, self.high, self.last = valid.copy(), invalid.copy(), previous.copy()
+        self.at_low, self.at_high, self.at_last = np.maximum(rooms[0], tol.TINY), rooms[1].copy(), rooms[2].copy()
+        # (M,) whether the last secant along the branch went past the end; whether the last guess was valid
+        self.overshot, self.was_valid = np.zeros((2, len(valid)), bool)
+
+    def guess(self, active: Int, may_be_secant: bool) -> tuple[Array, Bool]:
+        """Where those that are active (m,) end by a secant, if that fits (m,), else between low and high."""
+        low, high, last = self.low[active], self.high[active], self.last[active]
+        a, b, c = self.at_low[active], self.at_high[active], self.at_last[active]
+        overshot = self.overshot[active]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            secant = low + (high - low) * a / (a - b)
+            extrapolated = low + (low - last) * a / (c - a)
+            guess = np.where(b <= 0, secant, extrapolated)
+            fits: Bool = np.asarray(((guess - low) * (high - guess) > 0) & ~overshot & may_be_secant)
+        # where a secant along the branch has gone past the end, the end is close by
+        between = np.where(overshot, high - BACK * (high - low), 0.5 * (low + high))
+        return np.where(fits, guess, between), fits
+
+    def narrow(self, active: Int, value: Array, room: Array, fits: Bool) -> None:
+        """Take values (m,) of those that are active, and the rooms there, for the nearer side of their ends."""
+        is_valid = room > 0
+        self.overshot[active] = fits & np.isnan(room)
+        # the Illinois rule: the value of an end that has stayed twice is halved
+        self.at_high[active[is_valid & self.was_valid[active]]] *= 0.5
+        self.at_low[active[~is_valid & ~self.was_valid[active]]] *= 0.5
+        self.was_valid[active] = is_valid
+        rows = active[is_valid]
+        self.last[rows], self.at_last[rows] = self.low[rows], self.at_low[rows]
+        self.low[rows], self.at_low[rows] = value[is_valid], room[is_valid]
+        rows = active[~is_valid]
+        self.high[rows], self.at_high[rows] = value[~is_valid], room[~is_valid]
 
 
 def crossed_at(follower: Follower, changes: Changes, value: Array) -> Array:

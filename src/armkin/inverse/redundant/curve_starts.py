@@ -78,19 +78,8 @@ def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[
     The number is -1 where there is no answer. postures: (M, n) further answers of targets owner (M,), for each of which
     a plane is added; they are left out where the joint of the planes is the redundant one.
     """
-    guide, values, N = nearly_closed(follower.arm, follower.redundant), over_a_turn(PLANES), len(follower.target)
-    row, t = np.repeat(np.arange(N), PLANES), np.tile(values, N)
-    source = follower._replace(redundant=guide)
-    if guide is follower.redundant:
-        q = follower.branches_at(row, t)
-        solving, extra = ~np.isnan(q[:, :, 0]), q[:0, 0]
-    else:
-        q, defect = source.candidates(row, t)
-        rows, extra = _answers_between(source, values, defect.reshape(N, PLANES, -1))
-        rows, extra = np.append(rows, owner), np.append(extra, postures, axis=0)
-        row, t = np.append(row, rows), np.append(t, extra[:, guide.joint])
-        candidates = source.candidates(rows, t[N * PLANES :])
-        q, solving = np.append(q, candidates[0], axis=0), np.append(defect, candidates[1], axis=0) < tol.NEAR_DEFECT
+    guide, N = nearly_closed(follower.arm, follower.redundant), len(follower.target)
+    row, t, q, solving, extra = _starts_on_planes(follower, guide, owner, postures)
     order, count = np.lexsort((t, row)), np.bincount(row, minlength=N)
     plane = np.empty_like(row)
     plane[order] = numbers_within(count)
@@ -104,6 +93,28 @@ def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[
     grid = np.full((*planes.values.shape, q.shape[1] + 1), -1)
     grid[nodes.row, nodes.plane, branch[index]] = np.arange(len(index))
     return planes, nodes, grid[:, :, :-1]
+
+
+def _starts_on_planes(
+    follower: Follower, guide: Redundancy, owner: Int, postures: Array
+) -> tuple[Int, Array, Array, Bool, Array]:
+    """Targets (S,) and values (S,) of the guide's joint, candidates (S, B, n) there, and which are near answers (S, B).
+
+    The last (E,) have planes of their own, through answers (E, n) between the others, and the postures that are given.
+    """
+    values, N = over_a_turn(PLANES), len(follower.target)
+    row, t = np.repeat(np.arange(N), PLANES), np.tile(values, N)
+    if guide is follower.redundant:
+        q = follower.branches_at(row, t)
+        return row, t, q, ~np.isnan(q[:, :, 0]), q[:0, 0]
+    source = follower._replace(redundant=guide)
+    q, defect = source.candidates(row, t)
+    between, answers = _answers_between(source, values, defect.reshape(N, PLANES, -1))
+    own_row, extra = np.append(between, owner), np.append(answers, postures, axis=0)
+    own_t = extra[:, guide.joint].copy()
+    own_q, own_defect = source.candidates(own_row, own_t)
+    solving = np.append(defect, own_defect, axis=0) < tol.NEAR_DEFECT
+    return np.append(row, own_row), np.append(t, own_t), np.append(q, own_q, axis=0), solving, extra
 
 
 def _answers_between(source: Follower, t: Array, defect: Array) -> tuple[Int, Array]:

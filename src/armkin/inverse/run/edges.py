@@ -35,7 +35,6 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
 
     The candidates do not include all branches where a joint is free.
     """
-    _, _, target, near = goals
     doubts = _doubted_targets(goals, runner, rows)
     parts, pending = _linkage_seeds(goals, runner, doubts), np.ones(len(rows), bool)
     for part_rows, seeds in parts:
@@ -44,29 +43,34 @@ def decide_edges(goals: Goals, runner: Recorded, batch: Batch, rows: Int) -> Bat
             batch = examine_targets(goals, batch, rows[part_rows], seeds, runner.others)
     unsettled = None
     if pending.any():
-        if len(part := np.flatnonzero(pending & doubts.narrow)):  # another range of values may have solutions
-            narrow = rows[part]
-            doubts.first[part], second, _ = _candidates_at_two(runner, target[narrow], near[narrow], near[narrow] + 1.0)
-            doubts.second[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
-        batch_rows, tight, first, second, loose, _, has_free_ends, _, simple = rows_of(doubts, pending)
-        # seeds with the preferred values for free joints, and those that other values change
-        seed_sets = [first, second] if loose.any() else [first]
-        if runner.geometry.ends:
-            is_loose: Bool = np.asarray(loose.any(axis=1))
-            seed_sets.append(np.where(is_loose[:, None, None], tight, np.nan))
-            unsettled = np.zeros(len(target), bool)
-            unsettled[batch_rows[has_free_ends]], batch.complete[batch_rows[has_free_ends]] = True, False
-        label = np.tile(np.arange(loose.shape[1]), len(seed_sets))
-        if len(seed_sets) > 1:
-            padding = np.zeros((len(loose), (len(seed_sets) - 1) * loose.shape[1]), bool)
-            loose, simple = (np.concatenate([x, padding], axis=1) for x in (loose, simple))
-        seeds = Seeds.of(np.concatenate(seed_sets, axis=1), label, loose, simple)
+        seeds = _free_joint_seeds(goals, runner, doubts, pending)
         parts = [*([] if runner.geometry.ends else parts), (np.flatnonzero(pending), seeds)]
+        if runner.geometry.ends:
+            free_ends, unsettled = rows[pending & doubts.ends], np.zeros(len(goals.target), bool)
+            unsettled[free_ends], batch.complete[free_ends] = True, False
     elif runner.geometry.ends:
         return batch
     seeds = stack_rows([seeds for _, seeds in parts])
     rows = rows[np.concatenate([part for part, _ in parts])]
     return examine_targets(goals, batch, rows, seeds, runner.others, unsettled)
+
+
+def _free_joint_seeds(goals: Goals, runner: Recorded, doubts: _Doubts, pending: Bool) -> Seeds:
+    """Seeds of pending targets (K,) with the preferred values for free joints, and those that other values change."""
+    if len(part := np.flatnonzero(pending & doubts.narrow)):  # another range of values may have solutions
+        target, near = goals.target[doubts.rows[part]], goals.near[doubts.rows[part]]
+        doubts.first[part], second, _ = _candidates_at_two(runner, target, near, near + 1.0)
+        doubts.second[part] = np.where(doubts.loose[part][:, :, None], second, np.nan)
+    _, tight, first, second, loose, *_, simple = rows_of(doubts, pending)
+    seed_sets = [first, second] if loose.any() else [first]
+    if runner.geometry.ends:
+        is_loose: Bool = np.asarray(loose.any(axis=1))
+        seed_sets.append(np.where(is_loose[:, None, None], tight, np.nan))
+    label = np.tile(np.arange(loose.shape[1]), len(seed_sets))
+    if len(seed_sets) > 1:
+        padding = np.zeros((len(loose), (len(seed_sets) - 1) * loose.shape[1]), bool)
+        loose, simple = (np.concatenate([x, padding], axis=1) for x in (loose, simple))
+    return Seeds.of(np.concatenate(seed_sets, axis=1), label, loose, simple)
 
 
 def _linkage_seeds(goals: Goals, runner: Recorded, doubts: _Doubts) -> list[tuple[Int, Seeds]]:

@@ -243,6 +243,18 @@ class _Groups:
         return Examined(listed, present, label, status, self.free_joints, missed, surface, moved, all_beyond)
 
 
+def _correct(goals: Goals, q: Array, size: Array, goal: Int) -> tuple[Array, Array, Bool]:
+    """Candidates q (M, n) moved onto the targets goal (M,), what they miss, and which of them lie beyond a fold; these
+    stay. size: (M,) what they miss before."""
+    arm, task, target = goals.arm, goals.task, goals.target[goal]
+    out_of_reach, unsolved = np.zeros(len(q), bool), np.flatnonzero(size > tol.SOLUTION)
+    out_of_reach[unsolved] = high_order_roots.beyond_folds(arm, task, q[unsolved], target[unsolved])
+    rows = np.flatnonzero(~out_of_reach)
+    # towards a root of third order each step goes a third of the way
+    q[rows], size[rows] = newton.correct(arm, task, q[rows], target[rows], steps=40, patience=PATIENCE)
+    return q, size, out_of_reach
+
+
 def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
     """Candidates moved onto their targets, those that miss by less than `seed_limit`, and grouped."""
     arm, task, target, near = goals
@@ -259,13 +271,8 @@ def _settle_seeds(goals: Goals, seeds: Seeds, seed_limit: float) -> Examined:
     size[rows] = newton.misses(arm, task, flat[rows], target[goal[rows]])
     out_of_reach, is_near = np.zeros(len(flat), bool), np.arange(len(flat)) % q.shape[1] == 0
     inexact = np.flatnonzero(~(is_near | sure.reshape(-1, n).any(axis=1) | (size < tol.ROUNDING_RESIDUAL)))
-    if len(inexact):
-        rows = inexact[size[inexact] < seed_limit]
-        unsolved = rows[size[rows] > tol.SOLUTION]
-        out_of_reach[unsolved] = high_order_roots.beyond_folds(arm, task, flat[unsolved], target[goal[unsolved]])
-        rows = rows[~out_of_reach[rows]]
-        # towards a root of third order each step goes a third of the way
-        flat[rows], size[rows] = newton.correct(arm, task, flat[rows], target[goal[rows]], steps=40, patience=PATIENCE)
+    if len(rows := inexact[size[inexact] < seed_limit]):
+        flat[rows], size[rows], out_of_reach[rows] = _correct(goals, flat[rows], size[rows], goal[rows])
     q, size, is_beyond = flat.reshape(K, -1, n), size.reshape(K, -1), out_of_reach.reshape(K, -1)
     # `near` is a candidate as it is, where it solves the target; where it stands for a self-motion already it is none
     stands = ((q[:, 1:] == near[:, None]).all(axis=2) & sure[:, 1:].any(axis=2)).any(axis=1)

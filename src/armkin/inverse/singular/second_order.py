@@ -18,6 +18,8 @@ from armkin.model.units import radian_or_reach
 BOTH_SENSES = np.array([1.0, -1.0])[:, None, None]
 BACK = 5  # steps, at most, back onto the curve
 MAX_DISTANCE = 0.04  # distance [rad, reaches], at most, at which the series is compared with g
+CHANGE_SHARE = 0.2  # change of g'', at most, as a share of b: up to 0.27 |g| passes `SOLUTION` within h both ways
+CHORD_SHARE = 0.1  # distance of a curve from its tangent, at most, as a share of h; others have polynomials
 
 
 class Series(NamedTuple):
@@ -39,13 +41,29 @@ class Series(NamedTuple):
         w = -(across * second_derivative[:, :-1, None]).sum(axis=1)
         return cls(V[:, -1], w, S[:, -1], second_derivative[:, -1], across)
 
+    @property
+    def bend(self) -> Array:
+        """The size of b (M,), never zero."""
+        return np.maximum(np.abs(self.b), tol.TINY)
+
     def turns(self, change: Array | float = 0.0) -> Bool:
         """Where g turns before it passes `SOLUTION`, if g'' is less than b by `change` (M,)."""
-        return np.asarray(self.sigma**2 < 2.0 * tol.SOLUTION * (np.maximum(np.abs(self.b), tol.TINY) - change))
+        return np.asarray(self.sigma**2 < 2.0 * tol.SOLUTION * (self.bend - change))
+
+    def outcome(self, h: Array, g: Array, offset: Array) -> tuple[Bool, Bool]:
+        """Which curves (M,) surely turn before they pass `SOLUTION`, and which surely pass it first.
+
+        g: (2, M) residuals at distances h (M,) both ways, of postures offset (M,) beside the curves.
+        """
+        cubic = np.abs(0.5 * (g[0] - g[1]) - self.sigma * h)
+        quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * self.b * h**2) + self.v.shape[1] * h * offset
+        change = (6.0 * cubic + 12.0 * quartic) / h**2  # of g'', at most
+        turns = self.turns() & (change < CHANGE_SHARE * self.bend) & self.turns(change)
+        return np.asarray(turns), ~self.turns() & (self.sigma**2 > 2.0 * tol.SOLUTION * (self.bend + change))
 
     def ends(self) -> Array:
         """Where |g| is `SOLUTION`: (2, M), first against v."""
-        sigma, bend = self.sigma, np.maximum(np.abs(self.b), tol.TINY)
+        sigma, bend = self.sigma, self.bend
         # first where g has the sign of b, else at `other_exit`, or beyond the turn
         exit_distance = 2.0 * tol.SOLUTION / (sigma + np.sqrt(sigma**2 + 2.0 * tol.SOLUTION * bend))
         root = np.sqrt(np.maximum(sigma**2 - 2.0 * tol.SOLUTION * bend, 0.0))
@@ -70,9 +88,9 @@ def decide(arm: Arm, task: Task, q: Array, target: Array, linear: newton.Linear,
     sigma^2 < 2 SOLUTION |g''| as far as 4 sqrt(SOLUTION / b), it turns before, and passes it on both sides.
     """
     r, _, S, _ = linear
-    v, w, sigma, b, across = series
-    bend, has_turn = np.maximum(np.abs(b), tol.TINY), series.turns()
-    h = np.where(has_turn, 4.0 * np.sqrt(tol.SOLUTION / bend), 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY))
+    v, w, sigma, _, across = series
+    turn_distance = 4.0 * np.sqrt(tol.SOLUTION / series.bend)
+    h = np.where(series.turns(), turn_distance, 2.0 * tol.SOLUTION / np.maximum(sigma, tol.TINY))
     undecided = (h <= MAX_DISTANCE) & ((r * r).sum(axis=1) < tol.ROUNDING_RESIDUAL**2)
     undecided &= S[:, -2] * h > 4.0 * tol.SOLUTION  # what solves the target beside the curve must not pass for its ends
     h, (decided, boundary) = np.minimum(h, MAX_DISTANCE), np.zeros((2, len(q)), bool)
@@ -82,19 +100,10 @@ def decide(arm: Arm, task: Task, q: Array, target: Array, linear: newton.Linear,
             break
         way = 0.5 * (h * h)[:, None] * w + BOTH_SENSES * h[:, None] * v + correction
         moved = _moved_pose(arm, task, q, way, target, linear)
-        g, offset = (
-            moved[:, :, -1],
-            np.linalg.norm(moved[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], tol.TINY),
-        )
-        cubic = np.abs(0.5 * (g[0] - g[1]) - sigma * h)
-        quartic = np.abs(0.5 * (g[0] + g[1]) - 0.5 * b * h**2) + arm.n * h * offset
-        change = (6.0 * cubic + 12.0 * quartic) / h**2  # of g'', at most
-        # up to a change of 0.27 b |g| passes `SOLUTION` on both sides within h: 0.2 leaves room
-        turns = has_turn & (change < 0.2 * bend) & series.turns(change)
-        passes = ~has_turn & (sigma**2 > 2.0 * tol.SOLUTION * (bend + change))
+        offset = np.linalg.norm(moved[:, :, :-1], axis=2).max(axis=0) / np.maximum(S[:, -2], tol.TINY)
+        turns, passes = series.outcome(h, moved[:, :, -1], offset)
         chord_error = 0.5 * h**2 * np.linalg.norm(w, axis=1) + np.linalg.norm(correction, axis=2).max(axis=0) + offset
-        # a curve that leaves its tangent by a tenth of h or more is left to the polynomials of `local_structure`
-        newly = undecided & (turns | passes) & (chord_error < 0.1 * h)
+        newly = undecided & (turns | passes) & (chord_error < CHORD_SHARE * h)
         decided, boundary = decided | newly, boundary | (newly & turns)
         undecided &= ~newly & (offset < 0.5 * last_offset)  # the next step must come closer to tell more
         last_offset, correction = offset, correction - (across * moved[:, :, :-1, None]).sum(axis=2)

@@ -140,6 +140,21 @@ class _RootPair(NamedTuple):
     converged: Bool
 
 
+def _pair_system(A: Array, B: Array, w: Array, curved: Array, third: Array, axis: Array) -> Array:
+    """The Newton system (M, 2 n + 1, 2 n + 1) of a pair's middle, half gap and its square w (M,).
+
+    A, B: (M, n, n) mean and difference of the Jacobians; curved, third: (M, n) derivatives by w of the mean residual
+    and of the slope; axis: (M, n) along which the half gap keeps its length.
+    """
+    M, n = axis.shape
+    system = np.zeros((M, 2 * n + 1, 2 * n + 1))
+    system[:, :n, :n] = system[:, n:-1, n:-1] = A
+    system[:, :n, n:-1], system[:, n:-1, :n] = w[:, None, None] * B, B
+    system[:, :n, -1], system[:, n:-1, -1] = curved, third
+    system[:, -1, n:-1] = axis
+    return system
+
+
 def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
     """The pairs of roots about postures q (M, n), whose weakest direction is the pairs', on targets.
 
@@ -163,11 +178,7 @@ def _find_pairs(arm: Arm, task: Task, q: Array, target: Array) -> _RootPair:
         A, B = 0.5 * (plus[1] + minus[1]), (plus[1] - minus[1]) / (2.0 * h[:, :, None])
         curved = (B @ u[:, :, None])[:, :, 0]
         third = ((A @ u[:, :, None])[:, :, 0] + slope) / (2.0 * h**2)
-        system = np.zeros((len(active), 2 * n + 1, 2 * n + 1))
-        system[:, :n, :n] = system[:, n:-1, n:-1] = A
-        system[:, :n, n:-1], system[:, n:-1, :n] = w[:, None, None] * B, B
-        system[:, :n, -1], system[:, n:-1, -1] = 0.5 * curved, third
-        system[:, -1, n:-1] = axis[active]
+        system = _pair_system(A, B, w, 0.5 * curved, third, axis[active])
         residual = np.concatenate([mean, slope, np.zeros((len(active), 1))], axis=1)
         with np.errstate(all="ignore"):
             step = newton.nudged(np.linalg.solve, np.nan_to_num(system), np.nan_to_num(residual)[:, :, None])[:, :, 0]
