@@ -158,23 +158,13 @@ def _rank_branches(key: Array, valid: Bool, within_limits: Bool, is_free: Bool) 
 def _joint_motion(q: Array, near: Array, scale: Array) -> Array:
     """Sums of |change| from near (n,), each joint by its scale: (N, B, n) -> (N, B), as numpy would add them up."""
     if q.shape[-1] > 7:
-        return _sum_joints(np.abs(q - near) / scale)
+        return np.asarray((np.abs(q - near) / scale).sum(axis=-1))
     total = np.zeros(q.shape[:-1])
     for i, (start, unit) in enumerate(zip(near, scale, strict=True)):
         change = q[..., i] - start  # joint by joint, without an array of all joints
         np.abs(change, out=change)
         change /= unit
         total += change
-    return total
-
-
-def _sum_joints(values: Array) -> Array:
-    """``values.sum(axis=-1)`` with identical results; numpy sums up to seven numbers from left to right, but slowly."""
-    if values.shape[-1] > 7:
-        return np.asarray(values.sum(axis=-1))
-    total = values[..., 0].copy()
-    for i in range(1, values.shape[-1]):
-        total += values[..., i]
     return total
 
 

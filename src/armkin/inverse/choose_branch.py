@@ -16,15 +16,14 @@ import numpy as np
 from armkin.errors import NoBranchError, NoSolutionError, UsageError
 from armkin.formula.arrays import Array
 from armkin.forward import fk
-from armkin.inverse.answers.closest import Closest
-from armkin.inverse.answers.closest import closest_each as nearest_poses
+from armkin.inverse.answers.closest import Closest, closest_each
 from armkin.inverse.answers.solutions import Solutions, Status
+from armkin.inverse.branches import whole_turns
 from armkin.inverse.branches.names import find_branches
 from armkin.inverse.branches.whole_turns import nearest_row
-from armkin.inverse.branches.whole_turns import turns as copies_of
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import intervals_out
-from armkin.inverse.redundant.position_first import closest_each as nearest_positions
+from armkin.inverse.redundant.position_first import closest_positions
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.choose_redundant_joint import arm_without, redundant_alone, without_held
 from armkin.keep_out.clearance import Hit, hits, hits_text
@@ -186,16 +185,16 @@ def closest(request: Request, targets: Array) -> list[Closest]:
     held = _held_values(arm, request.held)
     free_arm = arm_without(arm, tuple(held.items()))
     if request.position_first:
-        nearest_each = nearest_positions(free_arm, targets, near[_kept_joints(arm, held)])
+        nearest_each = closest_positions(free_arm, targets, near[_kept_joints(arm, held)])
     else:
-        nearest_each = nearest_poses(free_arm, targets, request.task, near=near[_kept_joints(arm, held)])
+        nearest_each = closest_each(free_arm, targets, request.task, near=near[_kept_joints(arm, held)])
     return [replace(nearest, q=unlock(arm, held, nearest.q)) for nearest in nearest_each] if held else nearest_each
 
 
 def turns(request: Request, branch: TargetBranch) -> list[list[float]]:
     """All copies of a branch within limits, whole turns away, the nearest first [deg | mm]; held joints stay."""
     arm = request.arm
-    copies = copies_of(arm, branch.q, near=units.joints_in(arm, request.near_out))
+    copies = whole_turns.turns(arm, branch.q, near=units.joints_in(arm, request.near_out))
     held = [arm.joint_names.index(name) for name in (*request.held, *request.swept)]
     keeps_held = np.abs(copies[:, held] - branch.q[held]).max(axis=1, initial=0.0) < tol.HELD_DIFFERENCE
     return [list(row) for row in units.joints_out(arm, copies[keeps_held]).tolist()]
@@ -264,19 +263,19 @@ def _answers_of_call(request: Request, held: dict[str, float], s: Solutions, nea
     for i, (valid, status, proved) in enumerate(flags):
         branches = [
             TargetBranch(
-                q[i, b],
-                joints[i][b],
-                s.names[names[i][b]],
-                legal[i][b],
-                [] if legal[i][b] else np.flatnonzero(outside[i, b]).tolist(),
-                miss[i][b],
-                turn[i][b],
-                motion[i][b],
-                *next(near_by),
+                q=q[i, b],
+                joints=joints[i][b],
+                name=s.names[names[i][b]],
+                within_limits=legal[i][b],
+                outside=[] if legal[i][b] else np.flatnonzero(outside[i, b]).tolist(),
+                residual_mm=miss[i][b],
+                residual_deg=turn[i][b],
+                motion=motion[i][b],
+                clearance=clearance,
+                hits=hit,
                 interval=None if families is None else (families[i][b][0], families[i][b][1]),
             )
-            for b in range(len(valid))
-            if valid[b]
+            for b, (clearance, hit) in zip((b for b, is_branch in enumerate(valid) if is_branch), near_by, strict=False)
         ]
         free = [name for name, is_free in zip(unheld, s.free[i].tolist(), strict=True) if is_free]
         legal_count = sum(branch.within_limits for branch in branches)

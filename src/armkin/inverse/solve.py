@@ -28,7 +28,7 @@ from armkin.inverse.closed.geometry import Geometry
 from armkin.inverse.elimination.merge import projection
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.families import families
-from armkin.inverse.redundant.position_first import position_first as minima
+from armkin.inverse.redundant.position_first import solve_position_first
 from armkin.inverse.run import chunks
 from armkin.inverse.run import single as one_target
 from armkin.inverse.run.edges import examine_targets
@@ -94,7 +94,7 @@ def ik(
         s = ik(turned, targets, task, near=_actual_near(arm, near), position_first=position_first, **options)
         return _as_commanded(arm, s)
     if position_first:
-        return minima(ik, arm, task, targets, near)
+        return solve_position_first(ik, arm, task, targets, near)
     if redundant is not None:
         return families(ik, arm, redundant, targets, near, rounding)
     return solve_by(arm, *solver(arm, task), values, near, single=single, **options)

@@ -91,7 +91,7 @@ def window_pyplot() -> Any:
     plt = import_module("matplotlib.pyplot")
     try:
         plt.switch_backend("TkAgg" if plt.get_backend().lower() == "agg" else plt.get_backend())
-    except Exception as error:
+    except ImportError as error:
         raise MissingExtraError(
             f"matplotlib cannot open a window ({error}); install a toolkit (pip install PyQt6), or name a file"
         ) from None

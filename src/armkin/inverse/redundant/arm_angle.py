@@ -40,12 +40,12 @@ def _offsets(A: Array, B: Array) -> Array | None:
 
 
 class ArmAngle(NamedTuple):
-    """What is constant of such an arm."""
+    """Constants of an arm whose joints 1 to 3 and 5 to 7 are a spherical shoulder and wrist."""
 
     arm: Arm
     shoulder: Array  # (3,) seen before joint 1
-    upper: Array  # (3,) from the shoulder to axis 4, seen before joint 4
-    fore: Array  # (3,) from there to the wrist, seen behind joint 4
+    shoulder_to_elbow: Array  # (3,) from the shoulder to axis 4, seen before joint 4
+    elbow_to_wrist: Array  # (3,) from axis 4 to the wrist, seen behind joint 4
     wrist: Array  # (3,) seen before joint 7
     offset: Array  # (3, 2) of the angles t of shoulder and wrist from joint values
 
@@ -60,11 +60,12 @@ def arm_angle(arm: Arm) -> ArmAngle | None:
     first, second = (_offsets(L[k], L[k + 1]) for k in (1, 5))
     if shoulder is None or wrist is None or first is None or second is None:
         return None
-    upper = L[3][:3, :3].T @ (L[3][:3, 3] - shoulder[1])
-    fore = L[4][:3, :3] @ wrist[0] + L[4][:3, 3]
-    if min(np.hypot(*upper[:2]), np.hypot(*fore[:2])) <= tol.NO_LENGTH:
+    shoulder_to_elbow = L[3][:3, :3].T @ (L[3][:3, 3] - shoulder[1])
+    elbow_to_wrist = L[4][:3, :3] @ wrist[0] + L[4][:3, 3]
+    if min(np.hypot(*shoulder_to_elbow[:2]), np.hypot(*elbow_to_wrist[:2])) <= tol.NO_LENGTH:
         return None  # joint 4 does not move the wrist away from the shoulder
-    return ArmAngle(arm, shoulder[0], upper, fore, wrist[1], np.stack([first, second], axis=1))
+    offset = np.stack([first, second], axis=1)
+    return ArmAngle(arm, shoulder[0], shoulder_to_elbow, elbow_to_wrist, wrist[1], offset)
 
 
 class _Circles(NamedTuple):
@@ -87,7 +88,7 @@ def _frame(v: Array) -> Array:
 
 def _circles(srs: ArmAngle, target: Array) -> _Circles:
     """The circles of elbows that reach targets (N, 4, 4)."""
-    L, u, p = srs.arm.link, srs.upper, srs.fore
+    L, u, p = srs.arm.link, srs.shoulder_to_elbow, srs.elbow_to_wrist
     hand = inverse(L[0]) @ target @ inverse(L[7])
     d = hand[:, :3, :3] @ srs.wrist + hand[:, :3, 3] - srs.shoulder
     d_norm = np.linalg.norm(d, axis=1)

@@ -185,9 +185,9 @@ def places_of(follower: Follower, summary: Summary) -> Places:
 
     Where two branches merge both are legal, or none: one that is not at the next sample is for a stretch.
     """
-    t, vanishing, illegal = summary.t, summary.gone.at, summary.crossed.at
-    merging, room = _merging_ends(follower, t, summary.gone)
-    room0, room1 = summary.crossed.rooms.T
+    t, vanishing, illegal = summary.t, summary.ends.at, summary.crossings.at
+    merging, room = _merging_ends(follower, t, summary.ends)
+    room0, room1 = summary.crossings.rooms.T
     # which of the branches that are not legal at the next sample end there, too, and where
     ending = np.isnan(room1)
     place = np.zeros(len(ending), np.intp)
@@ -198,7 +198,7 @@ def places_of(follower: Follower, summary: Summary) -> Places:
     legal = np.empty(len(ending))
     legal[to_end] = merging[place[to_end]]
     crossing, place = rows_of(illegal, ~to_end), place[~to_end]
-    single = (room >= 0.0) & ~summary.gone.legal
+    single = (room >= 0.0) & ~summary.ends.legal
     short = rows_of(vanishing, single)
     row, branch = np.concatenate([crossing.row, short.row]), np.concatenate([crossing.branch, short.branch])
     end = crossing.value(1, t)
@@ -206,7 +206,7 @@ def places_of(follower: Follower, summary: Summary) -> Places:
         end = np.where(ending[~to_end], merging[place], end)
     inner, outer = np.concatenate([crossing.value(0, t), merging[single]]), np.concatenate([end, short.value(0, t)])
     at_inner = np.concatenate([room0[~to_end], room[single]])
-    rooms = at_inner, np.concatenate([room1[~to_end], summary.gone.room[single]]), np.full(len(row), np.nan)
+    rooms = at_inner, np.concatenate([room1[~to_end], summary.ends.room[single]]), np.full(len(row), np.nan)
     crossed = _Ends(follower, row, branch, True).between(inner, outer, inner, rooms)
     legal[~to_end] = crossed[: len(crossing.row)]
     return Places(merging, legal, short, (merging[single], crossed[len(crossing.row) :]))

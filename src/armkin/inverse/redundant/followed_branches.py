@@ -60,28 +60,28 @@ class Followed(NamedTuple):
 def _between_places(follower: Follower, angles: Array) -> tuple[Pieces, Bool, Bool]:
     """Pieces of targets whose curves change at angles (N, V) alone; which are short, and which targets' (N,)."""
     summary = summary_of_samples(follower, over_a_turn(EVEN_SAMPLES), angles)
-    changes = summary.crossed.at, summary.gone.at
+    changes = summary.crossings.at, summary.ends.at
     legal, present = ends = [place_between(summary.t, change, angles) for change in changes]
-    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(summary.crossed.rooms).any(axis=1))
+    crossing = np.flatnonzero(np.isfinite(legal) & ~np.isnan(summary.crossings.rooms).any(axis=1))
     legal[crossing] = crossed_at(follower, rows_of(changes[0], crossing), legal[crossing])
     explained = np.ones(len(angles), bool)
     for change, end in zip(changes, ends, strict=True):
         explained[change.row[np.isinf(end)]] = False
-    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (summary.legal, summary.there))
+    intervals, families = (rows_of(runs, explained[runs.row]) for runs in (summary.legal_runs, summary.present_runs))
     pieces = _of_runs(summary.t, intervals, True, changes[0], legal)
     illegal = _of_runs(summary.t, rows_of(families, ~families.within), False, changes[1], present)
-    return stack_rows([pieces, illegal]), summary.short, explained
+    return stack_rows([pieces, illegal]), summary.is_short, explained
 
 
 def _sampled_pieces(follower: Follower, finer: int) -> tuple[Pieces, Bool]:
     """Pieces of some targets, and which are short: one of which something may be hidden between samples, or without an
     answer, is asked again: all of a nearly stretched arm lie within a degree."""
     summary = summary_of_samples(follower, over_a_turn(SAMPLES * finer))
-    pieces, is_short = _all_pieces(follower, summary), summary.short
+    pieces, is_short = _all_pieces(follower, summary), summary.is_short
     if finer == 1:
         within_reach = distance(follower.arm, follower.redundant.task, follower.target) <= 1.0 + tol.SOLUTION
-        unanswered = summary.lost & (follower.arm.prismatic.any() | within_reach)
-        for factor, repeated in ((CLOSER_FACTOR, summary.hidden & ~unanswered), (FINER_FACTOR, unanswered)):
+        unanswered = summary.is_lost & (follower.arm.prismatic.any() | within_reach)
+        for factor, repeated in ((CLOSER_FACTOR, summary.has_hidden & ~unanswered), (FINER_FACTOR, unanswered)):
             targets = np.flatnonzero(repeated)
             at_once = max(SAMPLES // factor, 1)
             for rows in (targets[k : k + at_once] for k in range(0, len(targets), at_once)):
@@ -96,15 +96,15 @@ def _all_pieces(follower: Follower, summary: Summary) -> Pieces:
     """All pieces of the curves of some targets."""
     t, K = summary.t, summary.t.shape[1]
     places = places_of(follower, summary)
-    hidden, stretch = hidden_stretches(follower, t, summary.turns)
+    hidden, stretch = hidden_stretches(follower, t, summary.possible_crossings)
     gaps = hidden.set_before
     stretches, ends = rows_of(hidden, ~gaps), places.short
-    parts = [_of_runs(t, summary.legal, True, summary.crossed.at, places.legal)]
-    present = summary.there
+    parts = [_of_runs(t, summary.legal_runs, True, summary.crossings.at, places.legal)]
+    present = summary.present_runs
     holds = present.row[:, None] == np.append(hidden.row, ends.row)
     holds &= present.branch[:, None] == np.append(hidden.branch, ends.branch)
     holds &= (np.append(hidden.k, ends.sample(0, K)) - present.first[:, None]) % K < present.length[:, None]
-    families = _of_runs(t, present, False, summary.gone.at, places.there)
+    families = _of_runs(t, present, False, summary.ends.at, places.there)
     parts.append(rows_of(families, ~(present.within | holds.any(axis=1))))  # families that hold one are left out
     parts[0] = _without_gaps(follower, parts[0], rows_of(hidden, gaps), stretch[:, gaps])
     row, branch = np.append(ends.row, stretches.row), np.append(ends.branch, stretches.branch)

@@ -45,7 +45,7 @@ def check_arm(arm: Arm, task: str | None) -> None:
         raise UsageError(f"position first is for arms of 4 or 5 joints; {arm.name} has {arm.n}", joints=arm.n)
 
 
-def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near: ArrayLike | None) -> Solutions:
+def solve_position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near: ArrayLike | None) -> Solutions:
     """The postures within limits at the targets' positions whose rotation is nearest: (..., 4, 4) -> rows.
 
     Rows are local minima of the rotation angle, sorted by it (`Solutions.angle`), then by motion from near, (n,) or
@@ -83,7 +83,7 @@ def position_first(ik: Ik, arm: Arm, name: str | None, targets: ArrayLike, near:
     return replace(s, angle=angle.reshape(s.valid.shape))
 
 
-def closest_each(arm: Arm, targets: Array, near: Array) -> list[Closest]:
+def closest_positions(arm: Arm, targets: Array, near: Array) -> list[Closest]:
     """The postures within limits nearest to the positions of targets (N, 4, 4); near: (n,)."""
     poses = closest.closest_each(arm, targets[:, :3, 3], "xyz", near=near)
     q = np.array([pose.q for pose in poses]).reshape(-1, arm.n)

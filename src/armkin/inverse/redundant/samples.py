@@ -87,14 +87,14 @@ class SampleRuns(NamedTuple):
 class Summary(NamedTuple):
     """All that samples of N targets show."""
 
-    gone: BranchEnds
-    crossed: LimitCrossings
-    turns: PossibleCrossings
-    legal: SampleRuns
-    there: SampleRuns
-    hidden: Bool  # (N,) branches seem to be there between two values at which they are not
-    lost: Bool  # (N,) none is there at any of them
-    short: Bool  # (N,) no joint moves by REACH along any
+    ends: BranchEnds
+    crossings: LimitCrossings
+    possible_crossings: PossibleCrossings
+    legal_runs: SampleRuns
+    present_runs: SampleRuns
+    has_hidden: Bool  # (N,) branches seem to be there between two values at which they are not
+    is_lost: Bool  # (N,) none is there at any of them
+    is_short: Bool  # (N,) no joint moves by REACH along any
     t: Array  # (N, K) the samples' values of the joint
 
 

@@ -18,10 +18,12 @@ from armkin.model.units import radian_or_reach
 
 STEP = 0.3  # step [rad, reaches] along a curve
 MAX_STEPS = 250  # steps, at most, along a curve
-PASSED = 0.15  # share of a step: joint values this close to its chord are on the way; a curve is half as far off it
-BEND = 4.0  # length of a step, at most, in second smallest singular values
+PASSED_SHARE = (
+    0.15  # share of a step: joint values this close to its chord are on the way; a curve is half as far off it
+)
+SECOND_VALUES = 4.0  # length of a step, at most, in second smallest singular values
 CROSSING_STEP = 0.05  # step [rad, reaches] over a crossing
-STRAIGHT = 0.8  # cosine, at least, between the directions of two steps
+MIN_COSINE = 0.8  # cosine, at least, between the directions of two steps
 
 
 class Step(NamedTuple):
@@ -37,7 +39,9 @@ class Step(NamedTuple):
         offset, chord = newton.difference(arm, posture, self.start[place]), self.chord[place]
         chord_squared = (chord * chord).sum(axis=1)
         share = np.clip((offset * chord).sum(axis=1) / np.maximum(chord_squared, tol.TINY), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(offset - share[:, None] * chord, axis=1) < PASSED * np.sqrt(chord_squared))
+        return np.asarray(
+            np.linalg.norm(offset - share[:, None] * chord, axis=1) < PASSED_SHARE * np.sqrt(chord_squared)
+        )
 
 
 class Curves:
@@ -63,7 +67,7 @@ class Curves:
         landed, V, second, size = _onto_curve(arm, self._task, start, joints, self._target[rows])
         heading = _next_directions(V, second, last_heading)
         cosine = np.linalg.norm(heading, axis=1)
-        good = (size < tol.OFF_CURVE_RESIDUAL) & (cosine > STRAIGHT)
+        good = (size < tol.OFF_CURVE_RESIDUAL) & (cosine > MIN_COSINE)
         last_q = self.q[rows]
         self.q[rows[good]], self._heading[rows[good]] = landed[good], heading[good] / cosine[good, None]
         self._length[rows] = length = np.minimum(_longest_steps(second), np.where(good, 2.0, 0.5) * length)
@@ -79,7 +83,7 @@ class Curves:
 
 def _longest_steps(second: Array) -> Array:
     """Steps (M,) beside a second smallest singular value; where another curve crosses, one over the crossing."""
-    return np.asarray(np.where(second < tol.CROSSING_VALUE, CROSSING_STEP, np.minimum(STEP, BEND * second)))
+    return np.asarray(np.where(second < tol.CROSSING_VALUE, CROSSING_STEP, np.minimum(STEP, SECOND_VALUES * second)))
 
 
 def _next_directions(V: Array, second: Array, directions: Array) -> Array:

@@ -36,12 +36,12 @@ ORDERS = np.array(list(permutations(range(4))))  # orders of four roots: which o
 
 
 class _Roots(NamedTuple):
-    """q (N, 4, 3); real (N, 4); off (N, 4) [rad]: imaginary part of joints 2 and 3; loose (N,): one is free."""
+    """The roots of N targets."""
 
-    q: Array
-    real: Bool
-    off: Array
-    loose: Bool
+    q: Array  # (N, 4, 3)
+    is_real: Bool  # (N, 4)
+    imaginary_part: Array  # (N, 4) [rad] the largest of joints 2 and 3
+    has_free_joint: Bool  # (N,)
 
 
 class PositionPencil:
@@ -50,20 +50,20 @@ class PositionPencil:
     def __init__(self, arm: Arm, task: Task) -> None:
         position = Position(Chain(arm.link, arm.prismatic), arm.link[3][:3, 3], tol.EXACT, 0.0)
         self.arm, self.task, self.scale = arm, task, position.scale
-        self.from_base, self.rest = inverse(arm.link[0]), position.rest
+        self.from_base, self.constant = inverse(arm.link[0]), position.rest
         self.weights = np.array([[1.0, 0.0], [0.0, 1.0 / position.scale]])
         U, S, self.V = np.linalg.svd(self.weights @ position.A)
         self.weights = U.T @ self.weights / position.scale
         self.weights[0] /= S[0]
-        self.small, self.tight = float(S[1]), float(S[1] / max(S[0], tol.TINY))
+        self.second_value, self.value_ratio = float(S[1]), float(S[1] / max(S[0], tol.TINY))
         self.fixed = np.array([position._affine(w, [0.0, 0.0])[:3] for w in self.weights], float)
         self.tip = position.Y / position.scale
-        self.touching = max(tol.DOUBLE_DISTANCE, tol.BLUR_OF_PAIRS / max(self.tight, tol.NO_SECOND) ** 0.5)
+        self.touching = max(tol.DOUBLE_DISTANCE, tol.BLUR_OF_PAIRS / max(self.value_ratio, tol.NO_SECOND) ** 0.5)
 
     def roots(self, target: Array) -> _Roots:
         """All four roots of targets (N, 3), complex ones by their real parts."""
         p = target @ self.from_base[:3, :3].T + self.from_base[:3, 3]
-        right = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.rest
+        right = np.stack([p[:, 2], 0.5 * (p * p).sum(axis=1)], axis=1) - self.constant
         m, e = (np.broadcast_to(fixed, (len(p), 3)).copy() for fixed in self.fixed)
         m[:, 0] += right @ self.weights[0]
         e[:, 0] += right @ self.weights[1]
@@ -75,7 +75,7 @@ class PositionPencil:
         def value(row: Array) -> Any:  # complex
             return row[..., 0, None] + row[..., 1, None] * c + row[..., 2, None] * s
 
-        h0, h1 = value(m), value(e) / self.small
+        h0, h1 = value(m), value(e) / self.second_value
         gx, gy = (self.V[0, k] * h0 + self.V[1, k] * h1 for k in range(2))
         x, y, z = (value(row) for row in self.tip)
         radius2 = x * x + y * y
@@ -93,7 +93,7 @@ class PositionPencil:
 
     def _half_tangents(self, m: Array, e: Array) -> tuple[NDArray[Any], Array, Array]:
         """Eigenvalues (N, 4): tan((q3 - psi) / 2); cosine and sine of psi, (N, 1): at ``psi + pi`` e is largest."""
-        k, N = self.small, len(m)
+        k, N = self.second_value, len(m)
         M = np.empty((N, 3, 2, 2))
         M[:, :, 0, 0], M[:, :, 0, 1] = e - k * self.tip[0], k * (self.tip[1] - m)
         M[:, :, 1, 0], M[:, :, 1, 1] = k * (self.tip[1] + m), e + k * self.tip[0]
@@ -118,7 +118,7 @@ def recognise(arm: Arm, task: Task, ideal: Geometry, why: str) -> Geometry | Non
     """All roots of three turning joints near the class `ideal`, whose branches' places they take."""
     pencil = PositionPencil(arm, task)
     seeds = recorded_formula(arm, task, ideal)
-    if pencil.tight < tol.NO_SECOND or np.prod(seeds.axes) != 4:
+    if pencil.value_ratio < tol.NO_SECOND or np.prod(seeds.axes) != 4:
         return None
 
     def rows(target: Array) -> Rows:
@@ -132,15 +132,15 @@ def recognise(arm: Arm, task: Task, ideal: Geometry, why: str) -> Geometry | Non
 def _solve_chunk(pencil: PositionPencil, target: Array) -> Rows:
     """Branches (N, 4, 3), nan where a root is not real; guesses are complex roots that all but are."""
     arm, task, roots = pencil.arm, pencil.task, pencil.roots(target)
-    row, place = np.nonzero(roots.real)
+    row, place = np.nonzero(roots.is_real)
     root, size = newton.correct(arm, task, roots.q[row, place], target[row])
     q = np.full_like(roots.q, np.nan)
     q[row, place] = np.where((size <= tol.ANSWERED)[:, None], root, np.nan)
     absent = np.isnan(q[:, :, 0])
-    near_root = absent & (roots.real | (roots.off < pencil.touching))
+    near_root = absent & (roots.is_real | (roots.imaginary_part < pencil.touching))
     gaps = newton.distances(arm, q, q) + 9.0 * np.eye(4)
     meeting = (gaps < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
-    doubt = near_root.any(axis=1) | meeting | roots.loose
+    doubt = near_root.any(axis=1) | meeting | roots.has_free_joint
     return Rows(q, doubt, np.ones(len(target), bool), None, np.where(near_root[:, :, None], roots.q, np.nan))
 
 
