@@ -66,6 +66,7 @@ def test_an_answer_without_a_best_branch_is_refused() -> None:
         ("pulses", [1, 2, 3.5], "damaged"),
         ("pulses", ["1", "2", "3"], "damaged"),
         ("pulses", [True, False, True], "damaged"),
+        ("joints", ["1", 2, 3], "lists of numbers"),
         ("joints", [10**400, 0, 0], "finite"),
         ("joints", [float("nan"), 0, 0], "finite"),
     ],

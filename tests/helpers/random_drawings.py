@@ -17,7 +17,7 @@ BROKEN_ELEMENTS = (
     ('<rect width="4" height="4" rx="-1"/>', "rx -1 is below 0"),
     ('<polyline points="1 2 3"/>', "odd count"), ('<polyline points="1 2 a b"/>', "has what is no number"),
     ('<line x2="3em"/>', "'3em' is no length"), ('<line x2="1furlong"/>', "is no length"),
-    ('<g transform="matrix(1 2 3 4 5)"><line x2="1"/></g>', "matrix has 5 numbers"),
+    ('<g transform="matrix(1 2 3 4 5)"><line x2="1"/></g>', "matrix has 5 numbers; it takes 6"),
     ('<g transform="rotate(1) foo(2)"><line x2="1"/></g>', "is not known"),
     ('<g transform="scale(1e8) scale(1e8)"><line x2="1"/></g>', "farther away"),
     ('<use href="http://example.org/x.svg#a"/>', "which is not in this file"),

@@ -17,6 +17,14 @@ _MAX_NUMBER = 1e9  # size of a number, at most
 _NO_RADIUS = 1e-9  # radius below which an arc is a line
 _COMMANDS = {"M": 2, "L": 2, "H": 1, "V": 1, "C": 6, "S": 4, "Q": 4, "T": 2, "A": 7, "Z": 0}
 _UNITS = {"": 1.0, "px": 1.0, "in": 96.0, "mm": 96 / 25.4, "cm": 96 / 2.54, "pt": 4 / 3, "pc": 16.0, "q": 96 / 101.6}
+_COUNTS = {
+    "matrix": "6",
+    "translate": "1 or 2",
+    "scale": "1 or 2",
+    "rotate": "1 or 3",
+    "skewX": "1",
+    "skewY": "1",
+}  # of numbers
 _TRANSFORM = re.compile(r"\s*,?\s*(matrix|translate|scale|rotate|skewX|skewY)\s*\(([^()]*)\)")
 
 
@@ -96,7 +104,7 @@ def _one_transform(kind: str, values: list[float]) -> Matrix:
     if kind in ("skewX", "skewY") and count == 1:
         tangent = math.tan(math.radians(values[0]))
         return (1.0, 0.0, tangent, 1.0, 0.0, 0.0) if kind == "skewX" else (1.0, tangent, 0.0, 1.0, 0.0, 0.0)
-    raise ShapeError(f"{kind} has {count} numbers")
+    raise ShapeError(f"{kind} has {count} numbers; it takes {_COUNTS[kind]}")
 
 
 def outlines(tag: str, attributes: Mapping[str, str], transform: Matrix) -> list[list[Point]]:

@@ -200,8 +200,10 @@ def _answer_pose(answer: dict[str, Any]) -> Pose:
 
 
 def _checked_numbers(values: Any) -> list[float]:
-    if not isinstance(values, list) or not values or not all(type(number) in (int, float) for number in values):
+    if not values:
         raise UsageError("the answer on standard input has no joints to send")
+    if not isinstance(values, list) or not all(type(number) in (int, float) for number in values):
+        raise UsageError("the answer on standard input is damaged: joint values and tool are lists of numbers")
     try:
         return [float(number) for number in values]
     except OverflowError:
