@@ -25,6 +25,7 @@ from armkin.inverse.singular import near_itself
 from armkin.inverse.tasks.task import Task, read_poses, targets_at
 from armkin.model.arm import Arm
 
+_Read = tuple[Array, Array | float, Sequence[Any]]  # targets as they are solved, defects of rotations, entries
 TURNED_AT_ONCE = 512  # poses transposed at once, which fit a core's cache
 
 
@@ -45,7 +46,7 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
     step = -(-N // -(-N // runner.code.at_once())) if N else 1  # equal parts, which can share buffers
     batch = empty_batch(N, math.prod(runner.axes), arm.n)
     target, rounding = np.empty_like(raw), np.zeros(N)
-    tip = None if common is None else position(arm, common)
+    tip, is_pose = None if common is None else position(arm, common), task.orientation == "full"
 
     def solve_rows(rows: slice) -> list[Doubted]:
         """Solve some rows in one thread, chunk after chunk; returns those on an edge."""
@@ -53,10 +54,9 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
         on_edge: list[Doubted] = []
         for start in range(rows.start, rows.stop, step):
             chunk = slice(start, min(start + step, rows.stop))
-            goal: Array = raw[chunk]
-            entries: Sequence[Any] = target_entries(task, goal) if task.orientation != "full" else ()
-            if task.orientation == "full":
-                goal, rounding[chunk], entries = read_poses(goal)
+            given = raw[chunk]
+            read: _Read = read_poses(given) if is_pose else (given, 0.0, target_entries(task, given))
+            goal, rounding[chunk], entries = read
             target[chunk] = goal
             if len(goal) == 1:
                 outputs = runner.in_numbers(goal)
@@ -66,11 +66,12 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
             close = near[chunk] if common is None else common
             at_tip = np.empty(0, np.intp)
             if examine:
-                tips, x = position(arm, close) if tip is None else tip, entries[9 if task.orientation == "full" else 0]
+                tips, x = position(arm, close) if tip is None else tip, entries[9 if is_pose else 0]
                 at_tip = targets_at(task, goal, tips, near_itself.ROOM * arm.reach, x)
             part = Goals(arm, task, goal, near[chunk])
             doubted = _write_chunk(part, (*runner.axes, len(goal)), rows_of(batch, chunk), outputs, close, at_tip)
-            on_edge.append(doubted._replace(rows=start + doubted.rows))
+            if len(doubted.rows):
+                on_edge.append(doubted._replace(rows=start + doubted.rows))
         return on_edge
 
     doubted = [chunk for part in share_rows(solve_rows, N, workers, step, step) for chunk in part]
@@ -78,7 +79,7 @@ def solve_closed_form(goals: Goals, geometry: Geometry, common: Array | None, ex
     unsolved = np.empty(0, np.intp)
     if geometry.doubts is not None:
         unsolved = np.concatenate([unsolved, *(chunk.rows for chunk in doubted)])
-    elif examine and doubted:  # of no targets there are no chunks
+    elif examine and doubted:
         batch = _decide_doubted(goals._replace(target=target), runner, batch, stack_rows(doubted))
     return Solved(batch, math.prod(runner.axes), target, rounding, unsolved)
 
