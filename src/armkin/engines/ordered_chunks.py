@@ -16,11 +16,6 @@ class Engine(NamedTuple):
     cluster: str | None = None
 
     @property
-    def in_process(self) -> bool:
-        """Whether chunks run in this process."""
-        return self.workers == 1 and self.cluster is None
-
-    @property
     def uses_pool(self) -> bool:
         """Whether chunks run in other processes of this machine."""
         return self.workers > 1 and self.cluster is None
