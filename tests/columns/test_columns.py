@@ -205,6 +205,24 @@ def test_a_run_goes_on_where_it_was_ended(
     assert not folder.exists()
 
 
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_part_that_a_signal_cuts_off_is_swept(
+    rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, times: int
+) -> None:
+    """A signal that came while a part went to the disk left its half beside the finished ones."""
+    written: list[int] = []
+
+    def interrupt(descriptor: int) -> None:
+        written.append(descriptor)
+        if len(written) == 2 + times:  # after the job and the parts before
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "fsync", interrupt)
+    assert run_ik(rows, tmp_path / "out.csv").code == 130
+    left = sorted(path.name for path in (tmp_path / "out.csv.parts").iterdir())
+    assert left == [*(f"{number:08d}" for number in range(times)), "job.json", "lock"]
+
+
 def test_another_job_is_refused_and_loses_nothing(rows: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     out = tmp_path / "out.csv"
     with monkeypatch.context() as patch:

@@ -73,8 +73,7 @@ class Parts:
             except BaseException:
                 self.leave()
                 raise
-            for left in self.folder.glob(f"*{_UNFINISHED}"):
-                left.unlink()
+            self._sweep()
 
     def _check_job(self) -> None:
         """Note what is asked, or raise UsageError where the parts on disk belong to another question."""
@@ -130,8 +129,10 @@ class Parts:
         return {**self.__dict__, "_lock": None}  # another process may keep parts, and does not hold the folder
 
     def leave(self) -> None:
-        """Let go of the folder; its parts stay."""
+        """Let go of the folder: its finished parts stay, what a signal or a full disk has left half written goes."""
         if self._lock is not None:
+            with suppress(OSError):
+                self._sweep()
             self._lock.release()
             self._lock = None
 
@@ -144,18 +145,17 @@ class Parts:
         return self.folder / f"{number:08d}"
 
     def _write(self, place: Path, *data: bytes) -> None:
-        """Write a file whole or not at all."""
+        """Write a file aside and rename it; what stays half written is swept when the folder is left or taken again."""
         unfinished_path = Path(f"{place}{_UNFINISHED}")
-        try:
-            with open(unfinished_path, "wb") as file:
-                file.writelines(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(unfinished_path, place)
-        except OSError:
-            with suppress(OSError):
-                unfinished_path.unlink()
-            raise
+        with open(unfinished_path, "wb") as file:
+            file.writelines(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(unfinished_path, place)
+
+    def _sweep(self) -> None:
+        for unfinished_path in self.folder.glob(f"*{_UNFINISHED}"):
+            unfinished_path.unlink()
 
     @contextmanager
     def _errors(self) -> Iterator[None]:
