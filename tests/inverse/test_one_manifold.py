@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from small_steps import manifolds
 
 import armkin
 from armkin.formula.arrays import Array
@@ -39,6 +40,15 @@ MEETING = {
              -1.5707967750023173],
     "three_dof": [-3.141614336823653, -1.5708555103047157, 9.269870674877077e-05],
 }  # fmt: skip
+# Elbows and wrists beside singular ones, whose self-motions are longer than 16 polynomials from one posture
+LONG = [
+    ("ur5e", 5, [-1.5707833435333534, -2.3561653643042035, 2.6074741421635457, 0.47400742867377277,
+                 -3.1415926469320996, -0.811357099359816]),
+    ("puma560", 3, [-2.3561944345090895, 1.8512401700274106, -1.523816430964725, -0.11866715835984154,
+                    -3.1415926745183502, -0.7853981656830631]),
+    ("puma560", 4, [2.5809644482746705, 0.6432416688362292, -1.5237933507398123, 0.22503440004391084,
+                    -3.1415895834922587, -0.6071761190695821]),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize("neighbours", [0, 60])
@@ -152,6 +162,21 @@ def test_self_motions_that_end_half_a_turn_on_are_rows_of_their_own() -> None:
         assert flips.sum() == count
         for way in (np.pi, -np.pi):
             assert _least_misses(arm, T, rows, 3, way).max(axis=0).min() > 1.5e-9
+
+
+@pytest.mark.parametrize(("name", "count", "q"), LONG)
+def test_long_self_motions_are_known_to_their_ends(name: str, count: int, q: list[float]) -> None:
+    """Two rows were lost where an end was not reached, one was listed twice, and one was lost, in this order.
+
+    Small steps from each row come by no other.
+    """
+    arm = armkin.load(name)
+    T = armkin.fk(arm, q)
+    solutions = armkin.ik(arm, T)
+    rows = solutions.q[solutions.valid]
+    assert solutions.status == armkin.Status.SINGULAR
+    assert len(rows) == count
+    assert len(manifolds(arm, T, rows)) == count
 
 
 @pytest.mark.parametrize(("name", "count"), [("thor", 4), ("three_dof", 1)])

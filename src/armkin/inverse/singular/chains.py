@@ -15,7 +15,7 @@ from armkin.inverse.tasks.task import Task
 from armkin.model.arm import Arm
 
 FEW_LINKS = 4  # curves on each side of a posture whose component leaves a shortened span: others are decided elsewhere
-LINKS = 16  # curves on each side of a posture, each as long as the last one lets expect
+LINKS = 24  # curves on each side of a posture, each as long as the last one lets expect
 
 
 class Followed(NamedTuple):
@@ -33,14 +33,21 @@ class Followed(NamedTuple):
 class _Chains:
     """Two chains of curves from each of m postures: the first half of C = 2 m goes along v, the second against it."""
 
-    def __init__(self, arm: Arm, task: Task, at: Structure, begun: Int, q: Array, peers: Array, target: Array) -> None:
-        """begun: (m,) the postures; others as in `follow`."""
+    def __init__(
+        self, arm: Arm, task: Task, at: Structure, begun: Int, place: tuple[Int, Int], peers: Array, target: Array
+    ) -> None:
+        """begun: (m,) which postures of M, as in `follow`."""
         self._arm, self._task, posture = arm, task, np.tile(begun, 2)
-        self._q, self._peers, self._target = q[posture], peers[posture], target[posture]
+        row, column = place[0][posture], place[1][posture]
+        self._q, self._peers, self._target = peers[row, column], peers[row], target[row]
+        # (m, m) whether they are on one component; (C, K) which of them a peer is, -1 unless both are followed to ends
+        self.one, number = np.eye(len(begun), dtype=bool), np.full(peers.shape[:2], -1)
+        number[row, column] = np.where(at.known[posture], np.tile(np.arange(len(begun)), 2), -1)
+        self._number, self._v = np.where(at.known[posture, None], number[row], -1), at.v[begun]
+        self._opposite = np.roll(np.arange(len(posture)), len(begun))  # (C,) the other end of what is followed
         self._span = (at.span_ratio * at.span)[posture]  # (C,) that of the next curve
-        heading = np.concatenate([at.v[begun], -at.v[begun]])
         # (C, n) where the last curve leaves its span, nan if its component ends before, and the way there
-        self._end, self._heading = leave_spans(arm, at, posture, self._q, heading)
+        self._end, self._heading = leave_spans(arm, at, posture, self._q, np.concatenate([self._v, -self._v]))
         self.finished = np.isnan(self._end[:, 0])  # (C,) whether the component has ended, or closed
         self.active = ~self.finished  # (C,) whether another curve follows
         self.members = np.zeros(self._peers.shape[:2], bool)  # (C, K) which peers are on the way
@@ -56,12 +63,13 @@ class _Chains:
         self.active[chains] = curve.second > tol.HIGH_ORDER
         holds = curve.followed & self.active[chains]
         # a curve closes where its two sides meet: a step may pass where the other was, or now is
-        opposite = (chains + len(self.active) // 2) % len(self.active)
+        opposite = self._opposite[chains]
         opposite_start, holding = self._end[opposite], chains[holds]
         end, heading = leave_spans(arm, curve, every, start, curve.v)
         self._end[holding], self._heading[holding] = end[holds], heading[holds]
         tested = np.concatenate([self._peers[chains], opposite_start[:, None], self._end[opposite][:, None]], axis=1)
-        passed = members(curve, every, newton.difference(arm, tested, start[:, None])) & holds[:, None]
+        way = newton.difference(arm, tested, start[:, None])
+        passed = members(curve, every, way) & holds[:, None]
         self.members[chains] |= passed[:, :-2]
         shift = newton.difference(arm, start, self._q[chains])
         self._least_way[holding] = np.minimum(self._least_way[holding], (shift + curve.least_way)[holds])
@@ -71,6 +79,15 @@ class _Chains:
         self.finished[holding] = np.isnan(end[holds, 0])
         closed = passed[:, -2:].any(axis=1)
         self.finished[chains[closed]] = self.finished[opposite[closed]] = True
+        # a chain that comes to another posture has met the one that leads back from there
+        c, k = np.nonzero(passed[:, :-2] & (self._number[chains] >= 0))
+        posture = self._number[chains[c], k]
+        back = posture + len(self.one) * ((way[c, k] * self._v[posture]).sum(axis=1) > 0.0)
+        for pair in np.stack([chains[c], back], axis=1):
+            self.finished[pair], ends = True, self._opposite[pair]
+            self._opposite[ends] = ends[::-1]
+            both = self.one[pair % len(self.one)].any(axis=0)
+            self.one[both[:, None] & both] = True
         self.active &= ~self.finished
 
     def extent(self) -> Array:
@@ -83,13 +100,14 @@ def by_sides(array: Array | Bool) -> Any:
     return array.reshape(2, -1, *array.shape[1:])
 
 
-def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: Array) -> Followed:
-    """The components of postures q (M, n), whose structures are `at`, and which of their peers (M, K, n) lie on them.
+def follow(arm: Arm, task: Task, at: Structure, place: tuple[Int, Int], peers: Array, target: Array) -> Followed:
+    """The components of M of targets' peers (N, K, n), at place, with structures `at`, and which peers lie on them.
 
     Components on which the residual grows, and those that leave a shortened span, are followed both ways until they
     end or close; the latter at most as far as tells that they are manifolds.
     """
-    on_component = members(at, np.arange(len(q)), newton.difference(arm, peers, q[:, None]))
+    way = newton.difference(arm, peers[place[0]], peers[place][:, None])
+    on_component = members(at, np.arange(len(way)), way)
     ended = np.asarray(at.known & (np.maximum(-at.low, at.high) < at.span))
     known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
     joints, uncrossed = at.joints.copy(), at.uncrossed.copy()
@@ -97,18 +115,19 @@ def follow(arm: Arm, task: Task, at: Structure, q: Array, peers: Array, target: 
     goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.ROUNDING_RESIDUAL), at.followed)
     begun = np.flatnonzero(goes_on & (at.second > tol.HIGH_ORDER))
     if len(begun):
-        chains = _Chains(arm, task, at, begun, q, peers, target)
+        chains = _Chains(arm, task, at, begun, place, peers, target)
         for count in range(1, LINKS + 1):
             if not chains.active.any():
                 break
             chains.add_curves()
             enough = (count == FEW_LINKS) | (chains.extent().max(axis=1) >= tol.REACH)
             chains.active &= ~np.tile(enough & ~at.known[begun], 2)
-        extent, ended[begun] = chains.extent(), by_sides(chains.finished).all(axis=0)
-        on_component[begun] |= by_sides(chains.members).any(axis=0)
+        one, extent = chains.one, (chains.one[:, :, None] * chains.extent()).max(axis=1)
+        ended[begun] = ~(one @ ~by_sides(chains.finished).all(axis=0))
+        on_component[begun] = one @ (on_component[begun] | by_sides(chains.members).any(axis=0))
         manifold[begun] = extent.max(axis=1) >= tol.REACH
         known[begun] = manifold[begun] | ended[begun]
         boundary[begun] = by_sides(chains.boundary).any(axis=0) & ~manifold[begun]
-        uncrossed[begun] = by_sides(chains.uncrossed).all(axis=0)
+        uncrossed[begun] = ~(one @ ~by_sides(chains.uncrossed).all(axis=0))
         joints[begun] = manifold[begun, None] & (extent > tol.MOVED * extent.max(axis=1)[:, None])
     return Followed(on_component, known, manifold, boundary, joints, ended, ended & uncrossed)

@@ -165,15 +165,6 @@ def _equally_long(offsets: Array, push: Array) -> Bool:
     return np.asarray(all_far & (np.abs(offsets[:, 0] - offsets[:, 1]).max(axis=2) > 0.3 * least_length))
 
 
-def _moving_joints(offsets: Array, is_motion: Bool) -> Bool:
-    """Joints (M, n) that move at all on the long ways (2, 2, M, n), or on the short ones where it is no motion (M,).
-
-    Roots of high order are off by up to 10 `STILL_TURN`, short ways drawn back to a meeting end nearby: no motions.
-    """
-    length = np.abs(offsets).max(axis=1)
-    return np.asarray(np.where(is_motion[:, None], length[1] > tol.MOVED * 10 * STEP, length[0] > 10 * tol.STILL_TURN))
-
-
 def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: Array) -> tuple[Bool, Bool]:
     """Whether postures (M, n) can move along any direction that they lose, pulled back by steps of least norm."""
     unit = radian_or_reach(arm)
@@ -206,7 +197,10 @@ def self_motion(arm: Arm, task: Task, q: Array, V: Array, nullity: Int, target: 
     # A residual above rounding must stay small up to the long step: a fold's first tenth of a radian shows nothing.
     is_motion = (short_holds & ((growth[0] <= tol.ROUNDING_RESIDUAL) | long_holds)) | (long_holds & loses_several)
     np.logical_or.at(moving, row, is_motion)
-    np.logical_or.at(joints, row, is_motion[:, None] & _moving_joints(offsets, long_holds))
+    # roots of high order are off by up to 10 `STILL_TURN`, short ways drawn back to a meeting end nearby: no motions
+    short_way, long_way = np.abs(offsets).max(axis=1)
+    moves = np.where(long_holds[:, None], long_way > tol.MOVED * 10 * STEP, short_way > 10 * tol.STILL_TURN)
+    np.logical_or.at(joints, row, is_motion[:, None] & moves)
     return moving, joints
 
 
@@ -246,12 +240,6 @@ def null_directions(n: int, V: Array, nullity: Int) -> tuple[Int, Array]:
     return row[unique_rows], push[unique_rows]
 
 
-def _normals(columns: Array) -> Array:
-    """Vectors (..., k) at right angles to the k - 1 columns of (..., k, k - 1): of three, the cross product."""
-    k = columns.shape[-2]
-    return np.stack([(-1) ** i * np.linalg.det(np.delete(columns, i, axis=-2)) for i in range(k)], axis=-1)
-
-
 def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Array]]:
     """What `null_directions` returns, in parts, some directions several times.
 
@@ -265,7 +253,9 @@ def _null_directions(n: int, V: Array, nullity: Int) -> Iterator[tuple[Int, Arra
         rows = np.flatnonzero(nullity == k)
         basis = V[rows, ::-1][:, :k]
         fixed = list(itertools.combinations(range(n), k - 1))
-        yield _long_directions(rows, np.einsum("cmk,mkn->cmn", _normals(np.moveaxis(basis[:, :, fixed], 2, 0)), basis))
+        columns = np.moveaxis(basis[:, :, fixed], 2, 0)  # (C, m, k, k - 1), and what is at right angles to them
+        normals = np.stack([(-1) ** i * np.linalg.det(np.delete(columns, i, axis=-2)) for i in range(k)], axis=-1)
+        yield _long_directions(rows, np.einsum("cmk,mkn->cmn", normals, basis))
     several = np.flatnonzero(nullity > 1)
     in_null = (np.arange(n) >= n - nullity[several][:, None])[:, :, None]
     yield _long_directions(several, np.moveaxis(V[several].swapaxes(1, 2) @ np.where(in_null, V[several], 0.0), 1, 0))

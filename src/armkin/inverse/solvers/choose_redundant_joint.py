@@ -57,8 +57,11 @@ def redundancy(arm: Arm, task_name: str | None) -> Redundancy | None:
         return None
     if task_name is None:
         return redundancy(arm, task.name)  # the rest is prepared once
+    # the last joint moves no target where it turns about the tool's z axis, which alone is asked for
+    about_tool = max(abs(arm.link[-1][:2, 3]).max() / arm.reach, abs(arm.link[-1][:2, 2]).max()) <= tol.EXACT
+    about_tool &= task.orientation == "axis" and task.position == 3
     options = []
-    for joint in ([arm.n - 1] if task.orientation == "full" or _turns_about_the_tool(arm, task) else []) + [0]:
+    for joint in ([arm.n - 1] if task.orientation == "full" or about_tool else []) + [0]:
         if not arm.prismatic[joint]:
             rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
             with suppress(UsageError):
@@ -79,12 +82,6 @@ def nearly_closed(arm: Arm, redundant: Redundancy) -> Redundancy:
             if ideal is not None and (option := Redundancy(joint, rest_arm, redundant.task, ideal)).by_formula:
                 return option
     return redundant
-
-
-def _turns_about_the_tool(arm: Arm, task: Task) -> bool:
-    """Whether the last joint turns about the tool's z axis, which alone is asked for: it moves no target."""
-    offsets = np.array([arm.link[-1][:2, 3] / arm.reach, arm.link[-1][:2, 2]])
-    return task.orientation == "axis" and task.position == 3 and bool(np.abs(offsets).max() <= tol.EXACT)
 
 
 def move_targets(arm: Arm, redundant: Redundancy, target: Array, t: Array) -> Array:

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armkin.formula.array_tuples import stack_rows
-from armkin.formula.arrays import Array, Bool, Int, slices
+from armkin.formula.arrays import Array, Bool, slices
 from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.closed.geometry import Geometry, Rows
 from armkin.inverse.closed.three_joints import Position
@@ -123,7 +123,9 @@ def recognise(arm: Arm, task: Task, ideal: Geometry, why: str) -> Geometry | Non
 
     def rows(target: Array) -> Rows:
         roots = stack_rows([_solve_chunk(pencil, target[part]) for part in slices(max(len(target), 1), CHUNK)])
-        order = _root_order(newton.distances(arm, seeds.rows(target)[0], roots.q))
+        # each of the four places takes the root that makes their distances (N, places, roots) least in all
+        distances = np.nan_to_num(newton.distances(arm, seeds.rows(target)[0], roots.q), nan=np.pi)
+        order = ORDERS[distances[:, np.arange(4), ORDERS].sum(axis=2).argmin(axis=1)]
         return roots._replace(q=np.take_along_axis(roots.q, order[:, :, None], axis=1))
 
     return Geometry(f"near {ideal.name}", why, True, rows=rows, labels=ideal.labels, ordered=ideal.ordered, branches=4)
@@ -142,9 +144,3 @@ def _solve_chunk(pencil: PositionPencil, target: Array) -> Rows:
     meeting = (gaps < max(tol.APART_ROOTS, 2.0 * pencil.touching)).any(axis=(1, 2))
     doubt = near_root.any(axis=1) | meeting | roots.has_free_joint
     return Rows(q, doubt, np.ones(len(target), bool), None, np.where(near_root[:, :, None], roots.q, np.nan))
-
-
-def _root_order(distances: Array) -> Int:
-    """Which root (N, 4) stands in each of four places, by their distances (N, places, roots): least in all."""
-    distances = np.where(np.isnan(distances), np.pi, distances)
-    return np.asarray(ORDERS[distances[:, np.arange(4), ORDERS].sum(axis=2).argmin(axis=1)])
