@@ -37,9 +37,8 @@ class Step(NamedTuple):
         offset, chord = newton.difference(arm, posture, self.start[place]), self.chord[place]
         chord_squared = (chord * chord).sum(axis=1)
         share = np.clip((offset * chord).sum(axis=1) / np.maximum(chord_squared, tol.TINY), 0.0, 1.0)
-        return np.asarray(
-            np.linalg.norm(offset - share[:, None] * chord, axis=1) < PASSED_SHARE * np.sqrt(chord_squared)
-        )
+        beside = offset - share[:, None] * chord
+        return np.asarray((beside * beside).sum(axis=1) < PASSED_SHARE**2 * chord_squared)
 
 
 class Curves:
@@ -149,11 +148,11 @@ def _met_postures(arm: Arm, walk: Curves, curve: Int, posture: Array) -> Bool:
     curve_way, met = np.concatenate([curve, curve + M]), np.zeros(2 * P, bool)
     while walk.active.any():
         step = walk.step()
-        unsure = np.zeros(2 * M, bool)
-        unsure[step.rows] = step.unsure
-        unmet = np.flatnonzero(~met & np.isin(curve_way, step.rows))
-        row = curve_way[unmet]
-        met[unmet] = step.passes(arm, posture[unmet % P], np.searchsorted(step.rows, row)) | unsure[row]
+        place = np.full(2 * M, -1)
+        place[step.rows] = np.arange(len(step.rows))
+        unmet = np.flatnonzero(~met & (place[curve_way] >= 0))
+        row = place[curve_way[unmet]]
+        met[unmet] = step.passes(arm, posture[unmet % P], row) | step.unsure[row]
         has_unmet = np.bincount(curve[~(met[:P] | met[P:])], minlength=M) > 0
         walk.active &= np.concatenate([has_unmet, has_unmet & ~walk.closed[:M]])
     return np.asarray(met[:P] | (met[P:] & ~walk.closed[curve]))

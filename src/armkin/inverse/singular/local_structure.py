@@ -208,7 +208,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
     bordered, along_u = np.zeros((NODES, M, rows + 1, rows + 1)), np.empty((NODES, M, k))
     bordered[:, :, :rows, n:], bordered[:, :, rows, :n] = u, v
     # steps that do not halve from one to the next lead to no curve, or to another one
-    holds, active = np.zeros(M, bool), np.arange(M)
+    holds, active, farthest = np.zeros(M, bool), np.arange(M), 3.0 * np.abs(t)
     last_size, size_limit = np.zeros(M), span.copy()
     for _ in range(ITERATIONS):
         part = active if len(active) < M else slice(None)  # numbers cost copies
@@ -223,7 +223,7 @@ def _solve_nodes(arm: Arm, task: Task, start: _Start, side: Side) -> tuple[Bool,
         size = np.abs(step[:, :, :n]).max(axis=(0, 2))
         # Newton's method squares the error: the next step is about size^3 / last_size^2 long
         arrived = (size < tol.ARRIVED_STEP) | (size**3 < tol.ERROR * last_size[part] ** 2)
-        at_hand = (np.abs(x[:, part]).max(axis=2) < 3.0 * np.abs(t[:, part, 0])).all(axis=0) & (size < size_limit[part])
+        at_hand = (np.abs(x[:, part]) < farthest[:, part]).all(axis=(0, 2)) & (size < size_limit[part])
         holds[part], size_limit[part], last_size[part] = arrived & at_hand, 0.5 * size, size
         active = active[~arrived & at_hand]
         if not len(active):
@@ -246,7 +246,7 @@ def _crossed_by_none(inverse: Array, spacing: Array) -> Bool:
 def _least_residual(across: Array, parts: Array) -> Array:
     """Vectors as long as the least residual across v: its parts (..., k) along across (..., k, rows)."""
     if parts.shape[-1] == 1:
-        return np.asarray(parts / np.linalg.norm(across, axis=-1))
+        return np.asarray(parts / np.sqrt((across * across).sum(axis=-1)))
     L = np.asarray(np.linalg.cholesky(across @ across.swapaxes(-1, -2)), float).reshape(-1, *across.shape[-2:-1] * 2)
     return newton.nudged(np.linalg.solve, L, parts.reshape(len(L), -1, 1)).reshape(parts.shape)
 
