@@ -80,10 +80,9 @@ class _Chains:
         closed = passed[:, -2:].any(axis=1)
         self.finished[chains[closed]] = self.finished[opposite[closed]] = True
         # a chain that comes to another posture has met the one that leads back from there
-        c, k = np.nonzero(passed[:, :-2] & (self._number[chains] >= 0))
-        posture = self._number[chains[c], k]
-        back = posture + len(self.one) * ((way[c, k] * self._v[posture]).sum(axis=1) > 0.0)
-        for pair in np.stack([chains[c], back], axis=1):
+        for c, k in np.argwhere(passed[:, :-2] & (self._number[chains] >= 0)):
+            posture = self._number[chains[c], k]
+            pair = np.array([chains[c], posture + len(self.one) * (way[c, k] @ self._v[posture] > 0.0)])
             self.finished[pair], ends = True, self._opposite[pair]
             self._opposite[ends] = ends[::-1]
             both = self.one[pair % len(self.one)].any(axis=0)
