@@ -24,7 +24,7 @@ from bench_ik import random_joints
 from small_steps import manifolds
 
 POSES = 20_000
-ARMS = ("puma560", "ur5e", "irb120", "kuka_kr6_r700", "ar4", "thor")
+ARMS = ("puma560", "ur5e", "irb120", "ar4", "thor")
 AT_ROW = 1e-5  # distance [rad] of a posture from a row that is the same
 
 

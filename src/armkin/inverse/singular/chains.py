@@ -111,7 +111,7 @@ def follow(arm: Arm, task: Task, at: Structure, place: tuple[Int, Int], peers: A
     known, manifold, boundary = at.known.copy(), at.manifold.copy(), at.boundary.copy()
     joints, uncrossed = at.joints.copy(), at.uncrossed.copy()
     residual = np.linalg.norm(np.abs(at.g).sum(axis=0), axis=1)
-    goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.ROUNDING_RESIDUAL), at.followed)
+    goes_on = np.where(at.known, at.manifold & ~ended & (residual > tol.ERROR), at.followed)
     begun = np.flatnonzero(goes_on & (at.second > tol.HIGH_ORDER))
     if len(begun):
         chains = _Chains(arm, task, at, begun, place, peers, target)
