@@ -79,7 +79,7 @@ class Components:
         if loses_one.any():
             i, c = k[loses_one], b[loses_one]
             local = local_structure(arm, task, q[i, c], target[i], rows_of(self.lost.weak, self.lost.place[i, c]))
-            curve = chains.follow(arm, task, local, (i, c), q, target)
+            curve = chains.follow(self.goals, local, (i, c), q)
             self.known[i, c], self.on_manifold[i, c] = curve.known, curve.manifold
             self.moving_joints[i, c], self.is_boundary[i, c] = curve.joints, curve.boundary
             self.ended[i, c], self.uncrossed[i, c] = curve.ended, curve.uncrossed
