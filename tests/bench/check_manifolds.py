@@ -4,7 +4,7 @@
 
 Poses are random, with a third of the joints 1e-9 to 0.03 rad beside a multiple of 45 degrees. Of those that are
 answered as singular, twice: targets with two rows that a walk in small steps finds on one manifold; lost: targets of
-which a search from 64 random postures ends at one from which no walk comes by a row. 60 targets of an arm take three minutes.
+which a search from 64 random postures ends at one from which no walk comes by a row. 60 of an arm take three minutes.
 """
 
 from __future__ import annotations
