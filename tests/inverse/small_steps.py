@@ -23,13 +23,13 @@ def manifolds(arm: armkin.Arm, T: Array, rows: Array) -> list[set[int]]:
     parts = [{k} for k in range(len(rows))]
     for k in range(len(rows)):
         for sense in (1.0, -1.0):
-            for met in _walk(arm, T, rows, k, sense):
+            for met in walk(arm, T, rows, k, sense):
                 joined = set().union(*(part for part in parts if k in part or met in part))
                 parts = [part for part in parts if not part & joined] + [joined]
     return parts
 
 
-def _walk(arm: armkin.Arm, T: Array, rows: Array, k: int, sense: float) -> set[int]:
+def walk(arm: armkin.Arm, T: Array, rows: Array, k: int, sense: float) -> set[int]:
     """The other rows that a walk from the k-th comes by, until it misses too much or is back."""
     q, direction, _, second = _on_curve(arm, T, rows[k])
     direction, way, met = sense * direction, 0.0, set[int]()

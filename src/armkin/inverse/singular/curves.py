@@ -18,7 +18,7 @@ from armkin.model.units import radian_or_reach
 
 STEP = 0.3  # step [rad, reaches] along a curve
 MAX_STEPS = 250  # steps, at most, along a curve
-PASSED_SHARE = 0.15  # share of a step: joint values this close to its chord are on the way, a curve is half as far
+PASSED_SHARE = 0.15  # share of a step: joint values this close to its chord are passed; a curve is half as far off it
 SECOND_VALUES = 4.0  # length of a step, at most, in second smallest singular values
 CROSSING_STEP = 0.05  # step [rad, reaches] over a crossing
 MIN_COSINE = 0.8  # cosine, at least, between the directions of two steps
