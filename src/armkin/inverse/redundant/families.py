@@ -7,7 +7,7 @@ arm angle (`arm_angle`), or followed along the joint (`followed_branches`). Wher
 axis, which alone is asked for, each branch of the others is one.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +26,7 @@ from armkin.inverse.redundant.arm_angle import Turning, arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.curve_starts import PLANES
 from armkin.inverse.redundant.followed_branches import SAMPLES, Followed
-from armkin.inverse.redundant.interval_pieces import Pieces, golden_section, motion, vertex
+from armkin.inverse.redundant.interval_pieces import Known, Pieces, golden_section, motion, vertex
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.redundant.traced_families import Traced, trace_families
 from armkin.inverse.solvers.choose_redundant_joint import Redundancy, move_targets, nearly_closed
@@ -43,15 +43,22 @@ FREE_STEP = np.deg2rad(0.1)  # step [rad] of the parameter between postures that
 
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
 # `complete` (N,), and whether no joint moves by REACH along any, `short` (N,); `steps` of the golden section.
-Curves = Turning | Followed | Traced
+Curves = Turning | Followed | Traced | Known
 
 
 def families(
-    ik: Ik, arm: Arm, redundant: Redundancy, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
+    ik: Ik,
+    arm: Arm,
+    redundant: Redundancy,
+    targets: ArrayLike,
+    near: ArrayLike | None,
+    rounding: ArrayLike | None,
+    curves_of: Callable[[Follower], Iterator[Curves]] | None = None,
 ) -> Solutions:
     """Legal intervals of the redundant joint, and families without one: `armkin.ik` of such an arm.
 
-    q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad].
+    q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad]. curves_of: the curves
+    of all targets, some at a time, by default `curves_in_numpy`.
     """
     if redundant.about_tool_axis:
         return _with_tool_turn(ik, arm, redundant, targets, near, rounding)
@@ -65,7 +72,7 @@ def families(
     stands = (newton.misses(arm, task, nears, goal) <= limit) & ~outside_limits(arm, nears).any(axis=1)
     rows = _Rows(arm, redundant.joint, nears, stands)
     follower = Follower(ik, arm, redundant, goal, nears)
-    for curves in _curves_of(follower):
+    for curves in (curves_of or curves_in_numpy)(follower):
         rows.add(curves)
     rows.add_points(task, goal, not redundant.by_formula)
     q, interval, legal, branch = rows.stack_parts()
@@ -78,7 +85,7 @@ def families(
     return replace(s, interval=interval.reshape(*s.valid.shape, 2))
 
 
-def _curves_of(follower: Follower) -> Iterator[Curves]:
+def curves_in_numpy(follower: Follower) -> Iterator[Curves]:
     """The curves of all targets, some at a time: by the arm angle, followed along the redundant joint, or traced."""
     srs = arm_angle(follower.arm) if follower.redundant.joint else None
     followed = AT_ONCE // SAMPLES if follower.redundant.by_formula else TRACED
@@ -162,12 +169,12 @@ class _Rows:
         rows = slice(begin, self.added)
         self.complete[rows], self.short[rows] = curves.complete, curves.short
         near = self.near[begin + pieces.row]
-        q = _nearest_postures(self.arm, curves, near)
+        q = curves.nearest.copy() if isinstance(curves, Known) else _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
             q = curves.without_residual(pieces, q)
         near_rows = np.flatnonzero(self.stands[begin + pieces.row])
         q[near_rows] = _with_near(self.arm, self.joint, rows_of(pieces, near_rows), q[near_rows], near[near_rows])
-        if self.arm.keep_out:
+        if self.arm.keep_out and not isinstance(curves, Known):
             q = _with_free_postures(self.arm, curves, q, near)
         full_turn = pieces.b - pieces.a >= 2 * np.pi
         ends = np.stack([pieces.a, pieces.b], axis=1)
@@ -210,7 +217,7 @@ class _Rows:
         return q, interval, legal, branch
 
 
-def _nearest_postures(arm: Arm, curves: Curves, near: Array) -> Array:
+def _nearest_postures(arm: Arm, curves: Turning | Followed | Traced, near: Array) -> Array:
     """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample,
     then where a joint stands as near has it.
 
@@ -268,7 +275,7 @@ def _with_near(arm: Arm, joint: int, pieces: Pieces, q: Array, near: Array) -> A
     return postures
 
 
-def _with_free_postures(arm: Arm, curves: Curves, q: Array, near: Array) -> Array:
+def _with_free_postures(arm: Arm, curves: Turning | Followed | Traced, q: Array, near: Array) -> Array:
     """The nearest postures (P, n) of legal pieces that hit nothing, to `FREE_STEP`; where there is none, q as it is."""
     freed, pieces = q.copy(), curves.pieces
     for p in np.flatnonzero(pieces.legal & ~hits_nothing(arm, q)):

@@ -25,6 +25,15 @@ class Pieces(NamedTuple):
     start: Array  # (P, n) the posture of the best sample: the one nearest to near
 
 
+class Known(NamedTuple):
+    """`families.Curves` of N targets, of whose pieces the postures nearest to near are known."""
+
+    pieces: Pieces
+    short: Bool
+    complete: Bool
+    nearest: Array  # (P, n)
+
+
 def none(n: int) -> Pieces:
     """No piece of an arm of n joints."""
     zero, index = np.zeros(0), np.zeros(0, np.intp)
