@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from armkin.compiled import families_source
 from armkin.export import arm_formulas, class_forms
 from armkin.export.c import c_elimination, c_functions, c_program, keep_out_tables
 from armkin.export.c.source_parts import part_text
@@ -44,6 +45,7 @@ from armkin.model.units import radian_or_reach
 
 if TYPE_CHECKING:
     from armkin.inverse.closed.geometry import Geometry
+    from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
@@ -68,10 +70,13 @@ class Library(NamedTuple):
     level: int
 
 
-def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | None) -> Library:
+def library(
+    commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | None, redundant: Redundancy | None = None
+) -> Library:
     """The C file of an arm; only fk without a task, or if the class has no form in C.
 
-    commanded: the arm; arm: the same in actual joint values (`armkin.model.arm.actual_arm`), as branches have them.
+    commanded: the arm; arm: the same in actual joint values (`armkin.model.arm.actual_arm`), as branches have them;
+    redundant: its redundant joint, if its families are followed in C.
     """
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and class_forms.has_form(geometry):
@@ -89,6 +94,8 @@ def library(commanded: Arm, arm: Arm, task: Task | None, geometry: Geometry | No
     if commanded.keep_out and commanded.whole is None:
         parts += [keep_out_tables.clearances_code(commanded), _part_text("clearances")]
         parts += [_joint_loop("Least clearances and their pairs", "arm_clearance", 2)]
+    if redundant is not None:
+        parts += [part_text("whole_turns"), families_source.families_code(arm, redundant)]
     if branches:
         assert task is not None
         max_residual = ACCEPTED**2

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armkin.compiled import c_source, toolchain
+from armkin.compiled import c_source, families_source, toolchain
 from armkin.compiled.batch_results import Results
 from armkin.compiled.elimination_rows import CompiledElimination
+from armkin.compiled.followed_families import FollowedFamilies
 from armkin.compiled.joint_functions import THREAD_POSES, JointFunctions
 from armkin.compiled.one_target import Single
 from armkin.engines.threads import share_rows
@@ -48,11 +49,14 @@ class CompiledTask:
         solved_task, form = _class_of(self.turned, task)
         if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
             form = class_forms.plain_form(self.turned, solved_task, form) if form.places is not None else form
-        library = c_source.library(arm, self.turned, solved_task, form)
+        redundant = redundancy(self.turned, task)
+        has_families = families_source.has_form(self.turned, redundant)
+        library = c_source.library(arm, self.turned, solved_task, form, redundant if has_families else None)
         code = toolchain.load_library(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self.joint_functions = JointFunctions(arm, code)
         self.branches = library.branches
+        self.families = FollowedFamilies(code) if has_families else None
         if not self.branches:
             return
         self.task, self.geometry = solver(self.turned, task)

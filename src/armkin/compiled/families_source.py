@@ -1,0 +1,105 @@
+"""The C text of families: parts/followed_families.c for an arm, and the closed form of the joints that are not redundant."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from armkin.export.c.c_program import fill_fields
+from armkin.formula import c_and_js_code, recording
+from armkin.formula.c_and_js_code import number_text
+from armkin.inverse.closed.candidates import recorded_formula
+from armkin.inverse.closed.subproblems import Pair
+from armkin.inverse.numeric import tolerances as tol
+from armkin.inverse.redundant.arm_angle import arm_angle
+from armkin.inverse.redundant.boundaries import boundaries
+from armkin.inverse.redundant.followed_branches import EVEN_SAMPLES, STEPS
+from armkin.inverse.solvers.choose_redundant_joint import move_entries
+from armkin.inverse.solvers.solver_of_arm import solver
+
+if TYPE_CHECKING:
+    from armkin.formula.arrays import Entry
+    from armkin.inverse.solvers.choose_redundant_joint import Redundancy
+    from armkin.model.arm import Arm
+
+PART = Path(__file__).parent / "parts" / "followed_families.c"
+GOAL = 12  # numbers of a pose
+
+
+def has_form(arm: Arm, redundant: Redundancy | None) -> bool:
+    """Whether the families of an arm, in actual joint values, are followed in C."""
+    if redundant is None or arm.keep_out or redundant.joint != arm.n - 1 or redundant.task.orientation != "full":
+        return False
+    return redundant.by_formula and arm_angle(arm) is None and boundaries(arm) is not None
+
+
+def families_code(arm: Arm, redundant: Redundancy) -> str:
+    """`arm_families` of an arm, in actual joint values."""
+    form, fields = _others_code(arm, redundant)
+    fields |= {
+        "others": form,
+        "accepted": number_text(tol.ACCEPTED**2),
+        "reach": number_text(tol.REACH),
+        "beside": number_text(tol.BESIDE_END),
+        "crossing": number_text(tol.BESIDE_CROSSING),
+        "probe": number_text(tol.PROBE_SHARE),
+        "even": str(EVEN_SAMPLES),
+        "sections": str(STEPS),
+        "lower": _numbers(arm.lower),
+        "upper": _numbers(arm.upper),
+    }
+    return fill_fields(PART.read_text(encoding="utf-8"), fields)
+
+
+def _others_code(arm: Arm, redundant: Redundancy) -> tuple[str, dict[str, str]]:
+    """`arm_others`, all branches of a target at values of the redundant joint, and the fields that tell where they stand.
+
+    Values that branches share stand there once.
+    """
+    rest_form = recorded_formula(redundant.rest, solver(redundant.rest, redundant.task.name)[0], redundant.geometry)
+    n = arm.n
+
+    def formula(x: list[Entry]) -> list[Entry]:
+        goal = move_entries(arm, redundant, x[:GOAL], Pair(x[GOAL], x[GOAL + 1]))
+        return rest_form.candidates(goal, [None] * (n - 1))[:n]
+
+    recorded = recording.record(formula, GOAL + 2)
+    code = c_and_js_code.write_code(recorded, [*(f"goal[{k}]" for k in range(GOAL)), "c", "s"])
+    axes = np.broadcast_shapes((1,), *map(recording.axes_of, recorded.outputs))
+    places = np.empty((n + 1, int(np.prod(axes))), int)  # of each joint's values, and of the residuals
+    columns: list[tuple[int, str]] = []
+    for j, (output, texts) in enumerate(zip(recorded.outputs, code.outputs, strict=True)):
+        first = 0 if j == n - 1 else len(columns)
+        own = first + np.arange(len(texts)).reshape(recording.axes_of(output) or (1,))
+        places[j if j < n - 1 else n] = np.broadcast_to(own, axes).ravel()
+        columns += [(j, text) for text in texts] if j < n - 1 else []
+    places[n - 1] = len(columns)
+    columns.append((n - 1, "t[i]"))
+    stores = [f"value[{k} * ARM_LANES + i] = {text};" for k, (_, text) in enumerate(columns)]
+    stores += [f"miss[{k} * ARM_LANES + i] = {text};" for k, text in enumerate(code.outputs[n - 1])]
+    body = "\n".join(f"        {line}" for line in ["arm_circle(t[i], &c, &s);", *code.lines, *stores])
+    text = f"""/* All branches of the other joints at values t of the redundant one. */
+static void arm_others(const double *ARM_RESTRICT goal, const double *ARM_RESTRICT t, double *ARM_RESTRICT value,
+    double *ARM_RESTRICT miss)
+{{
+    int i;
+    for (i = 0; i < ARM_LANES; i++) {{
+        double c, s;
+{body}
+    }}
+}}
+"""
+    return text, {
+        "branches": str(places.shape[1]),
+        "columns": str(len(columns)),
+        "misses": str(len(code.outputs[n - 1])),
+        "joint_of": ", ".join(str(j) for j, _ in columns),
+        "column": ", ".join("{" + ", ".join(map(str, row)) + "}" for row in places[:n].T.tolist()),
+        "missed": ", ".join(map(str, places[n].tolist())),
+    }
+
+
+def _numbers(values: np.ndarray) -> str:
+    return ", ".join(number_text(float(value)) for value in values)
