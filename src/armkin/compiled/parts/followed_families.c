@@ -446,7 +446,7 @@ static int arm_followed(const double *goal, const double *near, const double *pl
     arm_samples samples;
     arm_changes crossings, ends;
     int runs[ARM_PLACES + 1][2], crossed[2 * ARM_PIECES], cut[ARM_PIECES];
-    double crossing[2 * ARM_PIECES], end[ARM_PIECES][2];
+    double crossing[2 * ARM_PIECES], end[ARM_PIECES][2], first_value[ARM_PIECES], last_value[ARM_PIECES];
     int b, i, k, side, kind, K, count, any = 0, wide = 0, refined = 0;
     int refined_at[2 * ARM_PIECES];
     all->count = 0;
@@ -487,6 +487,8 @@ static int arm_followed(const double *goal, const double *near, const double *pl
                 all->at[p] = arm_value_at(&samples, best);
                 all->high[p] = arm_value_at(&samples, best + 1);
                 cut[p] = !whole;
+                first_value[p] = arm_value_at(&samples, first);
+                last_value[p] = arm_value_at(&samples, first + length - 1);
                 for (side = 0; side < 2 && !whole; side++) {
                     const int change = runs[i][side], before = changes->k[change], next = (before + 1) % K;
                     end[p][side] = changes->place[change];
@@ -509,8 +511,8 @@ static int arm_followed(const double *goal, const double *near, const double *pl
         all->b[i] = ARM_PI;
         if (!cut[i])
             continue;
-        all->a[i] = all->at[i] - arm_turned(all->at[i] - end[i][0]);
-        all->b[i] = all->at[i] + arm_turned(end[i][1] - all->at[i]);
+        all->a[i] = fmin(first_value[i] - arm_wrapped(first_value[i] - end[i][0]), all->at[i]);
+        all->b[i] = fmax(last_value[i] + arm_wrapped(end[i][1] - last_value[i]), all->at[i]);
         all->low[i] = fmin(fmax(all->low[i], all->a[i]), all->b[i]);
         all->high[i] = fmin(fmax(all->high[i], all->a[i]), all->b[i]);
     }
