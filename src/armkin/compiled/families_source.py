@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.compiled import boundaries_source
 from armkin.export.c.c_program import fill_fields
 from armkin.formula import c_and_js_code, recording
 from armkin.formula.c_and_js_code import number_text
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.model.arm import Arm
 
-PART = Path(__file__).parent / "parts" / "followed_families.c"
+PARTS = Path(__file__).parent / "parts"
 GOAL = 12  # numbers of a pose
 
 
@@ -38,19 +39,22 @@ def has_form(arm: Arm, redundant: Redundancy | None) -> bool:
 def families_code(arm: Arm, redundant: Redundancy) -> str:
     """`arm_families` of an arm, in actual joint values."""
     form, fields = _others_code(arm, redundant)
-    fields |= {
+    bounds = boundaries(arm)
+    assert bounds is not None
+    fields |= boundaries_source.roots_fields(bounds) | {
         "others": form,
         "accepted": number_text(tol.ACCEPTED**2),
         "reach": number_text(tol.REACH),
         "beside": number_text(tol.BESIDE_END),
         "crossing": number_text(tol.BESIDE_CROSSING),
         "probe": number_text(tol.PROBE_SHARE),
+        "same_end": number_text(tol.SAME_END),
         "even": str(EVEN_SAMPLES),
         "sections": str(STEPS),
         "lower": _numbers(arm.lower),
         "upper": _numbers(arm.upper),
     }
-    return fill_fields(PART.read_text(encoding="utf-8"), fields)
+    return fill_fields((PARTS / "followed_families.c").read_text(encoding="utf-8"), fields)
 
 
 def _others_code(arm: Arm, redundant: Redundancy) -> tuple[str, dict[str, str]]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stack_rows
-from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
+from armkin.inverse.redundant.boundaries import boundaries, from_joint7
 from armkin.inverse.redundant.families import _nearest_postures
 from armkin.inverse.redundant.followed_branches import Followed
 from armkin.inverse.redundant.interval_pieces import Known, Pieces
@@ -32,7 +32,7 @@ class FollowedFamilies:
     def __init__(self, code: ctypes.CDLL) -> None:
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._call = code.arm_families
-        self._call.argtypes = [size, pointer, pointer, size, pointer, size, size, *[pointer] * 6]
+        self._call.argtypes = [size, pointer, pointer, pointer, size, size, *[pointer] * 6]
         self._call.restype = size
 
     def curves_of(self, follower: Follower) -> Iterator[Known]:
@@ -45,21 +45,20 @@ class FollowedFamilies:
         N, n = len(follower.target), follower.arm.n
         bounds = boundaries(follower.arm)
         assert bounds is not None
-        places, decided = boundary_angles(bounds, follower.target)
-        places = np.ascontiguousarray(places)
+        rotation, shoulder = from_joint7(bounds, follower.target)
+        frame = np.concatenate([rotation.reshape(N, 9), shoulder], axis=1)
         target, near = np.ascontiguousarray(follower.target), np.ascontiguousarray(follower.near)
         state, count = np.empty(N, np.uint8), np.empty(N, np.int64)
         room = N * MAX_PIECES
         branch, legal = np.empty(room, np.int64), np.empty(room, bool)
         interval, q = np.empty((room, 2)), np.empty((room, n))
         pointers = (x.ctypes.data for x in (state, count, branch, legal, interval, q))
-        self._call(N, target.ctypes.data, near.ctypes.data, n, places.ctypes.data, places.shape[1], room, *pointers)
-        count[~decided] *= 1
+        self._call(N, target.ctypes.data, frame.ctypes.data, near.ctypes.data, n, room, *pointers)
         total = int(count.sum())
         row = np.repeat(np.arange(N), count)
         a, b = interval[:total].T.copy()
         pieces = Pieces(row, branch[:total], legal[:total], a, b, a, b, a, a, b, q[:total])
-        known = Known(pieces, np.zeros(N, bool), (state == 0) & decided, q[:total])
+        known = Known(pieces, np.zeros(N, bool), state == 0, q[:total])
         rows = np.flatnonzero(~known.complete)
         return _with_followed(follower, known, rows) if len(rows) else known
 

@@ -6,13 +6,20 @@
 #define ARM_BESIDE @beside@ /* rad, from a place to the samples on its sides */
 #define ARM_BESIDE_CROSSING @crossing@ /* rad */
 #define ARM_PROBE @probe@ /* share of the way to the next sample */
+#define ARM_SAME_END @same_end@ /* rad */
+#define ARM_SAFE @safe@ /* safety factor on the rounding that polynomials show */
 enum {
     ARM_WAYS = @branches@, /* branches of the others */
     ARM_COLUMNS = @columns@, ARM_MISSES = @misses@, /* distinct values of joints, and residuals, of these branches */
     ARM_EVEN = @even@, /* even samples of a turn */
     ARM_SECTIONS = @sections@, /* steps of the golden section */
     ARM_PLACES = 128, ARM_PIECES = 64, /* of a target, at most; with more it is left to Python */
-    ARM_SAMPLES = ARM_EVEN + 2 * ARM_PLACES + ARM_LANES
+    ARM_SAMPLES = ARM_EVEN + 2 * ARM_PLACES + ARM_LANES,
+    ARM_EQUATIONS = @polynomials@, ARM_DEGREE = @degree@, /* polynomials of a target */
+    ARM_TAIL = @tail@, ARM_TERMS = @terms@, ARM_CELLS = @cells@, ARM_HALVINGS = @halvings@, ARM_NEWTON = @newton@,
+    ARM_SAMPLED = 2 * (ARM_DEGREE + ARM_TAIL) + 1, /* where each is asked */
+    ARM_ANGLES = (ARM_SAMPLED + 7) / 8 * 8, ARM_ORDERS = (ARM_DEGREE + ARM_TAIL + 8) / 8 * 8, /* the same, for vectors */
+    ARM_ROOTS = 256 /* roots of a target, at most */
 };
 enum { ARM_KNOWN = 0, ARM_LEFT = 1 }; /* what becomes of a target: answered, or left to Python */
 
@@ -41,6 +48,7 @@ ARM_INLINE void arm_circle(double q, double *cosine, double *sine)
 }
 
 @others@
+@roots@
 /* A number of [0, turn) that differs by whole turns. */
 ARM_INLINE double arm_turned(double x)
 {
@@ -520,18 +528,46 @@ static int arm_followed(const double *goal, const double *near, const double *pl
     return 1;
 }
 
-/* Families of n targets, poses row by row, at places (n, most), sorted, infinite past the last. near: as of `arm_batch`.
-   Pieces stand one after the other: count of each target, then of each piece its branch, whether it is legal, its ends and
-   its posture, for up to `room` of them. Returns how many targets were answered before the room ran out. */
-int64_t arm_families(int64_t n, const double *target, const double *near, int64_t near_step, const double *place,
-    int64_t most, int64_t room, uint8_t *state, int64_t *count, int64_t *branch, uint8_t *legal, double *interval, double *q)
+/* Places at which something may change, from the roots of all polynomials and the joint's own limits: sorted, each once. */
+static int arm_places(double *root, int count, double *place)
 {
+    const double lower = arm_least[ARM_JOINTS - 1], upper = arm_most[ARM_JOINTS - 1];
+    double last = -ARM_INFINITY;
+    int i, k, places = 0;
+    if (upper - lower < ARM_TURN) {
+        root[count++] = lower;
+        root[count++] = upper;
+    }
+    for (i = 0; i < count; i++) {
+        const double value = arm_turned(root[i] + ARM_PI) - ARM_PI;
+        for (k = i; k && root[k - 1] > value; k--)
+            root[k] = root[k - 1];
+        root[k] = value;
+    }
+    for (i = 0; i < count; last = root[i++])
+        if (root[i] - last > ARM_SAME_END) {
+            if (places == ARM_PLACES)
+                return -1;
+            place[places++] = root[i];
+        }
+    return places;
+}
+
+/* Families of n targets, poses row by row. frame: the same as the frame behind the last joint, its rotation row by row and
+   the shoulder seen there. near: as of `arm_batch`. Pieces stand one after the other: count of each target, then of each
+   piece its branch, whether it is legal, its ends and its posture, for up to `room` of them. Returns how many targets there
+   was room for. */
+int64_t arm_families(int64_t n, const double *target, const double *frame, const double *near, int64_t near_step,
+    int64_t room, uint8_t *state, int64_t *count, int64_t *branch, uint8_t *legal, double *interval, double *q)
+{
+    arm_tables tables;
     arm_pieces all;
     int64_t at, used = 0;
     int i, j;
+    arm_prepare(&tables);
     for (at = 0; at < n; at++) {
-        double goal[12], close[ARM_JOINTS];
-        int places = 0, wild = 0;
+        double goal[12], close[ARM_JOINTS], root[ARM_ROOTS + 2], place[ARM_PLACES];
+        int places, wild = 0;
         for (i = 0; i < 3; i++)
             for (j = 0; j < 4; j++)
                 goal[3 * j + i] = target[16 * at + 4 * i + j];
@@ -539,11 +575,12 @@ int64_t arm_families(int64_t n, const double *target, const double *near, int64_
             close[j] = near[at * near_step + j];
             wild |= !(fabs(close[j]) <= ARM_WILD);
         }
-        while (places < most && place[at * most + places] < ARM_INFINITY)
-            places++;
         count[at] = 0;
         state[at] = ARM_LEFT;
-        if (wild || places > ARM_PLACES || !arm_followed(goal, close, place + at * most, places, &all))
+        places = arm_turn_roots(&tables, frame + 12 * at, root);
+        if (places >= 0)
+            places = arm_places(root, places, place);
+        if (wild || places < 0 || !arm_followed(goal, close, place, places, &all))
             continue;
         if (used + all.count > room)
             return at;

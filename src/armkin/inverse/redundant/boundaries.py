@@ -99,13 +99,10 @@ def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None
 
 
 class _WristFrame:
-    """The arm with joint 7 held at t (M,), at targets (S, 4, 4): what is about the wrist, seen behind joint 6."""
+    """The arm with joint 7 held at t (M,), at targets `from_joint7`: what is about the wrist, seen behind joint 6."""
 
-    def __init__(self, bounds: Boundaries, target: Array, t: Complex) -> None:
-        self.bounds, self.t = bounds, t
-        self.target = shrink_translations(target, bounds.arm.reach)
-        base = bounds.link[0] @ [*bounds.shoulder, 1.0]
-        shoulder = (bounds.link[7] @ inverse(self.target) @ base)[:, :3]
+    def __init__(self, bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) -> None:
+        self.bounds, self.rotation, self.t = bounds, rotation, t
         self.u = self.seen_behind6(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # to the shoulder
         self.u_square = (self.u * self.u).sum(axis=0)
         self.cos = (bounds.offset - self.u_square) / (2.0 * bounds.swing)  # cosine of joint 4, from its middle
@@ -146,7 +143,7 @@ def _shoulder(frame: _WristFrame, e0: Array, e3: Array, cosine: float) -> Comple
     a, b, c = w[2] * u_square - k * u_w, u_w - k * w[2], w[1] * u[0] - w[0] * u[1]
     cross_square, p_square = k * k * -1.0 + u_square, px * px + py * py
     # in the frame behind joint 6, whose z axis is z6: n, n.p and n.q
-    nx, ny, nz = frame.seen_behind6(e0 @ (frame.target[:, :3, :3] @ bounds.link[7][:3, :3].T))
+    nx, ny, nz = frame.seen_behind6(e0 @ frame.rotation)
     n_p, n_q = nx * px + ny * py, ny * px - nx * py
     k1 = k - h * d[2]
     A = a * (k1 * n_p + d[2] * nz * p_square) + b * ((n_p + h * nz) * p_square)
@@ -166,9 +163,15 @@ def _limits_of_joint(arm: Arm, j: int) -> list[float]:
     return [lower, upper] if upper - lower < 2 * np.pi else []
 
 
-def _equations(bounds: Boundaries, target: Array) -> Complex:
-    """Values of all polynomials at samples (F, S, M)."""
-    frame = _WristFrame(bounds, target, sampled_at(DEGREE))
+def from_joint7(bounds: Boundaries, target: Array) -> tuple[Array, Array]:
+    """Targets (S, 4, 4) as the frame behind joint 7: its rotations (S, 3, 3), and the shoulder (S, 3) seen there."""
+    T = shrink_translations(target, bounds.arm.reach) @ inverse(bounds.link[7])
+    return T[:, :3, :3], (inverse(T) @ (bounds.link[0] @ [*bounds.shoulder, 1.0]))[:, :3]
+
+
+def equations(bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) -> Complex:
+    """Values (F, S, M) of all polynomials at t (M,), of targets `from_joint7`."""
+    frame = _WristFrame(bounds, rotation, shoulder, t)
     R, limits = bounds.link[:, :3, :3], [_limits_of_joint(bounds.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
     u, h = frame.before5(bounds.upper, bounds.fore), frame.u[2]
@@ -188,7 +191,7 @@ def _equations(bounds: Boundaries, target: Array) -> Complex:
 
 def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf past the last; whether that is all (S,)."""
-    values = _equations(bounds, target)
+    values = equations(bounds, *from_joint7(bounds, target), sampled_at(DEGREE))
     F, S, M = values.shape
     zeros = roots(values.reshape(-1, M), DEGREE)
     limits = np.array(_limits_of_joint(bounds.arm, 6))
