@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,19 @@ from armkin.inverse.redundant import turn_roots
 from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
 
 PART = Path(__file__).parent / "parts" / "family_places.c"
+MOVED_ROOT = 1e-8  # way [rad] by which bounds of rounding let it move a root, above which more digits are used
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
+
+
+def _with_numbers(operation: Callable[[Any, Any], Complex]) -> Callable[[Any, Any], Any]:
+    """An operation that leaves arrays to numpy, which does it with each of their numbers."""
+
+    def of_number(one: Any, other: Any) -> Any:
+        if isinstance(other, np.ndarray):
+            return NotImplemented
+        return operation(one, other if isinstance(other, Complex) else Complex(float(other)))
+
+    return of_number
 
 
 class Complex:
@@ -26,25 +39,25 @@ class Complex:
     def __init__(self, real: Entry, imaginary: Entry = 0.0) -> None:
         self.real, self.imaginary = real, imaginary
 
-    @staticmethod
-    def of(x: Any) -> Complex:
-        return x if isinstance(x, Complex) else Complex(float(x))
+    def sqrt(self) -> Complex:
+        assert isinstance(self.imaginary, float), "only roots of real numbers are asked for"
+        return Complex(np.sqrt(self.real))
 
-    def __add__(self, other: Any) -> Complex:
-        b = Complex.of(other)
+    @_with_numbers
+    def __add__(self, b: Complex) -> Complex:
         return Complex(arrays.add(self.real, b.real), arrays.add(self.imaginary, b.imaginary))
 
-    def __sub__(self, other: Any) -> Complex:
-        b = Complex.of(other)
+    @_with_numbers
+    def __sub__(self, b: Complex) -> Complex:
         return Complex(arrays.sub(self.real, b.real), arrays.sub(self.imaginary, b.imaginary))
 
-    def __mul__(self, other: Any) -> Complex:
-        b = Complex.of(other)
+    @_with_numbers
+    def __mul__(self, b: Complex) -> Complex:
         real = arrays.sub(arrays.mul(self.real, b.real), arrays.mul(self.imaginary, b.imaginary))
         return Complex(real, arrays.add(arrays.mul(self.real, b.imaginary), arrays.mul(self.imaginary, b.real)))
 
-    def __truediv__(self, other: Any) -> Complex:
-        b = Complex.of(other)
+    @_with_numbers
+    def __truediv__(self, b: Complex) -> Complex:
         if isinstance(b.imaginary, float) and b.imaginary == 0.0:
             return Complex(self.real / b.real, self.imaginary / b.real)
         over = arrays.add(arrays.mul(b.real, b.real), arrays.mul(b.imaginary, b.imaginary))
@@ -58,8 +71,9 @@ class Complex:
     def __radd__(self, other: Any) -> Complex:
         return self + other
 
-    def __rsub__(self, other: Any) -> Complex:
-        return Complex.of(other) - self
+    @_with_numbers
+    def __rsub__(self, b: Complex) -> Complex:
+        return b - self
 
     def __rmul__(self, other: Any) -> Complex:
         return self * other
@@ -82,31 +96,36 @@ class Angle:
 
 
 def recorded_equations(bounds: Boundaries) -> recording.Recording:
-    """The polynomials at one angle; inputs: rotation and shoulder, real and imaginary parts of cosine and sine."""
+    """The polynomials at one angle; inputs: rotation and shoulder, real and imaginary parts of cosine and sine, and
+    `lengths`, as what follows from these is to be as precise as the numbers are."""
+    known = np.concatenate([bounds.upper, bounds.fore]).tolist()
 
     def formula(x: list[Entry]) -> list[Entry]:
         entries = np.array([Complex(entry) for entry in x[:INPUTS]], object)
         angle = Angle(Complex(x[INPUTS], x[INPUTS + 1]), Complex(x[INPUTS + 2], x[INPUTS + 3]))
-        t = np.array([angle], object)
-        values = equations(bounds, entries[:9].reshape(1, 3, 3), entries[9:].reshape(1, 3), t).ravel()
+        given = iter(x[INPUTS + 4 :])
+        upper, fore = np.array([Complex(next(given) if v else 0.0) for v in known], object).reshape(2, 3)
+        own = bounds._replace(upper=upper, fore=fore)
+        rotation, shoulder = entries[:9].reshape(1, 3, 3), entries[9:].reshape(1, 3)
+        values = equations(own, rotation, shoulder, np.array([angle], object)).ravel()
         return [part for value in values for part in (value.real, value.imaginary)]
 
-    return recording.record(formula, INPUTS + 4)
+    return recording.record(formula, INPUTS + 4 + len(lengths(bounds)))
+
+
+def lengths(bounds: Boundaries) -> list[float]:
+    """The numbers, but zeros, that tell where shoulder and wrist are."""
+    return [float(v) for v in [*bounds.upper, *bounds.fore] if v]
 
 
 def roots_fields(bounds: Boundaries) -> dict[str, str]:
     """Values of the fields about polynomials and their roots in parts/followed_families.c."""
     recorded = recorded_equations(bounds)
-    inputs = [*(f"g[{k}]" for k in range(INPUTS)), "cr", "ci", "sr", "si"]
-    code = c_and_js_code.write_code(recorded, inputs)
-    stores = [f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs)]
-    lines = "\n".join(f"        {line}" for line in [*code.lines, *stores])
-    fields = {"real": "double", "suffix": "", "precision": "double", "rounding": number_text(tol.ROUNDING)}
-    fields |= {name: name for name in ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")}
-    fields |= {"shift": number_text(turn_roots.SHIFT), "equations": lines}
+    wide = "long double"
     return {
-        "roots": fill_fields(PART.read_text(encoding="utf-8"), fields),
-        "polynomials": str(len(code.outputs) // 2),
+        "roots": _roots_code(recorded, lengths(bounds), {"real": "double", "suffix": "", "angles": "ARM_ANGLES"}, ""),
+        "roots_wide": _roots_code(recorded, lengths(bounds), {"real": wide, "suffix": "_wide", "angles": "ARM_SAMPLED"}, "l"),
+        "polynomials": str(len(recorded.outputs) // 2),
         "degree": str(DEGREE),
         "tail": str(turn_roots.TAIL),
         "terms": str(turn_roots.TERMS),
@@ -114,4 +133,23 @@ def roots_fields(bounds: Boundaries) -> dict[str, str]:
         "halvings": str(turn_roots.HALVINGS),
         "newton": str(turn_roots.STEPS),
         "safe": number_text(turn_roots.SAFE),
+        "moved_root": number_text(MOVED_ROOT),
     }
+
+
+def _roots_code(recorded: recording.Recording, known: list[float], fields: dict[str, str], ending: str) -> str:
+    """parts/family_places.c for numbers of one precision; known: `lengths`; ending: of the names of C's functions."""
+    inputs = [*(f"g[{k}]" for k in range(INPUTS)), "cr", "ci", "sr", "si", *(f"v{k}" for k in range(len(known)))]
+    real, operations = fields["real"], c_and_js_code.C.operations | {"sqrt": f"sqrt{ending}({{}})"}
+    language = c_and_js_code.C._replace(real=f"const {real}", operations=operations)
+    code = c_and_js_code.write_code(recorded, inputs, language)
+    given = [f"const {real} v{k} = {number_text(value)};" for k, value in enumerate(known)]
+    stores = [f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs)]
+    names = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")
+    epsilon = "DBL_EPSILON" if real == "double" else "LDBL_EPSILON"
+    fields = fields | {name: name + ending for name in names} | {
+        "shift": number_text(turn_roots.SHIFT),
+        "rounding": f"({number_text(tol.ROUNDING)} * ({epsilon} / DBL_EPSILON))",
+        "equations": "\n".join(f"        {line}" for line in [*given, *code.lines, *stores]),
+    }
+    return fill_fields(PART.read_text(encoding="utf-8"), fields)

@@ -1,4 +1,4 @@
-/* Where families of a target may change, in @precision@ precision: the real roots of trigonometric polynomials, as
+/* Where families of a target may change, in numbers of type @real@: the real roots of trigonometric polynomials, as
    `armkin.inverse.redundant.turn_roots` finds them. */
 typedef struct {
     @real@ turn[4][ARM_ANGLES]; /* cosine and sine of where the polynomials are asked, real and imaginary parts */
@@ -52,21 +52,22 @@ static void arm_equations@suffix@(const @real@ *ARM_RESTRICT g, const @real@ (*A
     @real@ (*ARM_RESTRICT value)[ARM_ANGLES])
 {
     int i;
-    for (i = 0; i < ARM_ANGLES; i++) {
+    for (i = 0; i < @angles@; i++) {
         const @real@ cr = turn[0][i], ci = turn[1][i], sr = turn[2][i], si = turn[3][i];
 @equations@
     }
 }
 
-/* Series that are monotone in their cells, and have a root there. */
+/* Series that are monotone in their cells, and have a root there; of which polynomials, and what rounding may add. */
 typedef struct {
-    @real@ a[ARM_TERMS][ARM_ROOTS], middle[ARM_ROOTS], width[ARM_ROOTS];
+    @real@ a[ARM_TERMS][ARM_ROOTS], middle[ARM_ROOTS], width[ARM_ROOTS], slack[ARM_ROOTS];
+    int which[ARM_ROOTS];
     int count;
 } arm_simple@suffix@;
 
 /* A cell's roots, or its halves': 0 if some may be missing; noise counts as one. */
 static int arm_cell_roots@suffix@(const arm_tables@suffix@ *all, const @real@ *first, @real@ middle, @real@ width,
-    @real@ slack, arm_simple@suffix@ *found)
+    @real@ slack, int which, arm_simple@suffix@ *found)
 {
     struct {
         @real@ a[ARM_TERMS], middle, width;
@@ -111,6 +112,8 @@ static int arm_cell_roots@suffix@(const arm_tables@suffix@ *all, const @real@ *f
             for (j = 0; j < ARM_TERMS; j++)
                 found->a[j][found->count] = a[j];
             found->middle[found->count] = middle;
+            found->slack[found->count] = slack;
+            found->which[found->count] = which;
             found->width[found->count++] = wide;
         }
         for (side = 0; side < 2 && !single; side++, depth++) {
@@ -127,17 +130,18 @@ static int arm_cell_roots@suffix@(const arm_tables@suffix@ *all, const @real@ *f
     return decided;
 }
 
-/* Roots of series, by Newton's method. */
-static void arm_zeros@suffix@(arm_simple@suffix@ *found, double *root)
+/* Roots of series, by Newton's method; open: also of those polynomials of which rounding may move one by `most`. */
+static void arm_zeros@suffix@(arm_simple@suffix@ *found, double most, uint8_t *open, double *root)
 {
     int start, i, j, step;
     for (i = found->count; i % ARM_LANES; i++) { /* lanes without a series */
         for (j = 0; j < ARM_TERMS; j++)
             found->a[j][i] = j == 1;
-        found->middle[i] = found->width[i] = 0;
+        found->middle[i] = found->width[i] = found->slack[i] = 0;
+        found->which[i] = 0;
     }
     for (start = 0; start < found->count; start += ARM_LANES) {
-        @real@ x[ARM_LANES] = {0};
+        @real@ x[ARM_LANES] = {0}, slant[ARM_LANES];
         for (step = 0; step < ARM_NEWTON; step++) {
             @real@ value[ARM_LANES], slope[ARM_LANES] = {0};
             memcpy(value, found->a[ARM_TERMS - 1] + start, sizeof value);
@@ -149,26 +153,41 @@ static void arm_zeros@suffix@(arm_simple@suffix@ *found, double *root)
             for (i = 0; i < ARM_LANES; i++) {
                 x[i] -= value[i] / slope[i];
                 x[i] = x[i] > 1 ? 1 : x[i] < -1 ? -1 : x[i];
+                slant[i] = slope[i];
             }
         }
         for (i = 0; i < ARM_LANES; i++)
             root[start + i] = (double)(found->middle[start + i] + found->width[start + i] * x[i]);
+        for (i = 0; i < ARM_LANES; i++)
+            open[found->which[start + i]] |= !(found->slack[start + i] * found->width[start + i] <= most * @fabs@(slant[i]));
     }
 }
 
-/* Roots of all polynomials of a target, in no order: how many, -1 if some may be missing. root: room for ARM_ROOTS. */
-static int arm_turn_roots@suffix@(const arm_tables@suffix@ *all, const double *frame, double *root)
+/* Roots of the polynomials of a target that are open, in no order, behind `count` others: how many there are then. Those
+   stay open of which roots may be missing, or moved by `most`. root: room for ARM_ROOTS. */
+static int arm_turn_roots@suffix@(const arm_tables@suffix@ *all, const double *frame, double most, uint8_t *open,
+    double *root, int count)
 {
     @real@ value[2 * ARM_EQUATIONS][ARM_ANGLES], g[12], width = 4 * @atan@(1) / ARM_CELLS;
+    double own[ARM_ROOTS];
+    uint8_t still[ARM_EQUATIONS] = {0};
     arm_simple@suffix@ found;
-    int f, i, j, k, decided = 1;
-    for (k = 0; k < 12; k++)
-        g[k] = frame[k];
+    int f, i, j, k;
+    for (i = 0; i < 3; i++) /* a rotation to the last digit: half of R (3 - R' R) */
+        for (j = 0; j < 3; j++) {
+            @real@ sum = 3 * (@real@)frame[3 * i + j];
+            for (k = 0; k < 9; k++)
+                sum -= (@real@)frame[3 * i + k / 3] * frame[3 * (k % 3) + k / 3] * frame[3 * (k % 3) + j];
+            g[3 * i + j] = sum / 2;
+            g[9 + i] = frame[9 + i];
+        }
     arm_equations@suffix@(g, all->turn, value);
     found.count = 0;
     for (f = 0; f < ARM_EQUATIONS; f++) {
         @real@ re[ARM_ORDERS] = {0}, im[ARM_ORDERS] = {0}, at[ARM_CELLS] = {0}, slope[ARM_CELLS] = {0};
         @real@ tail = 0, total = 0, rest = 0, slack;
+        if (!open[f])
+            continue;
         for (i = 0; i < ARM_SAMPLED; i++)
             for (k = 0; k < ARM_ORDERS; k++) {
                 const @real@ x = value[2 * f][i], y = value[2 * f + 1][i];
@@ -201,9 +220,14 @@ static int arm_turn_roots@suffix@(const arm_tables@suffix@ *all, const double *f
                 for (j = 0; j < ARM_TERMS; j++)
                     a[j] += x * all->of_real[k][j] + y * all->of_imaginary[k][j];
             }
-            decided &= arm_cell_roots@suffix@(all, a, (2 * i + 1) * width - 4 * @atan@(1), width, slack, &found);
+            still[f] |= !arm_cell_roots@suffix@(all, a, (2 * i + 1) * width - 4 * @atan@(1), width, slack, f, &found);
         }
     }
-    arm_zeros@suffix@(&found, root);
-    return decided ? found.count : -1;
+    arm_zeros@suffix@(&found, most, still, own);
+    for (i = 0; i < found.count; i++)
+        if (!still[found.which[i]] && count < ARM_ROOTS)
+            root[count++] = own[i];
+    memcpy(open, still, sizeof still);
+    open[0] |= count == ARM_ROOTS;
+    return count;
 }

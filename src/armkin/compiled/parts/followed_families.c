@@ -1,12 +1,15 @@
 /* Families of targets of an arm with one joint more than they ask for, the last one: as `armkin.inverse.redundant`, by the
    closed form of the others, followed along that joint from place to place where anything can change. */
 
+#include <float.h>
+
 #define ARM_TOLD @accepted@ /* squared residual of a branch that is there */
 #define ARM_REACH @reach@ /* rad */
 #define ARM_BESIDE @beside@ /* rad, from a place to the samples on its sides */
 #define ARM_BESIDE_CROSSING @crossing@ /* rad */
 #define ARM_PROBE @probe@ /* share of the way to the next sample */
 #define ARM_SAME_END @same_end@ /* rad */
+#define ARM_MOVED_ROOT @moved_root@ /* rad by which rounding may move a root */
 #define ARM_SAFE @safe@ /* safety factor on the rounding that polynomials show */
 enum {
     ARM_WAYS = @branches@, /* branches of the others */
@@ -49,6 +52,7 @@ ARM_INLINE void arm_circle(double q, double *cosine, double *sine)
 
 @others@
 @roots@
+@roots_wide@
 /* A number of [0, turn) that differs by whole turns. */
 ARM_INLINE double arm_turned(double x)
 {
@@ -553,6 +557,14 @@ static int arm_places(double *root, int count, double *place)
     return places;
 }
 
+ARM_INLINE int arm_is_any(const uint8_t *open)
+{
+    int f, any = 0;
+    for (f = 0; f < ARM_EQUATIONS; f++)
+        any |= open[f];
+    return any;
+}
+
 /* Families of n targets, poses row by row. frame: the same as the frame behind the last joint, its rotation row by row and
    the shoulder seen there. near: as of `arm_batch`. Pieces stand one after the other: count of each target, then of each
    piece its branch, whether it is legal, its ends and its posture, for up to `room` of them. Returns how many targets there
@@ -561,12 +573,14 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
     int64_t room, uint8_t *state, int64_t *count, int64_t *branch, uint8_t *legal, double *interval, double *q)
 {
     arm_tables tables;
+    arm_tables_wide tables_wide;
     arm_pieces all;
     int64_t at, used = 0;
-    int i, j;
+    int i, j, prepared = 0;
     arm_prepare(&tables);
     for (at = 0; at < n; at++) {
         double goal[12], close[ARM_JOINTS], root[ARM_ROOTS + 2], place[ARM_PLACES];
+        uint8_t open[ARM_EQUATIONS];
         int places, wild = 0;
         for (i = 0; i < 3; i++)
             for (j = 0; j < 4; j++)
@@ -577,9 +591,14 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
         }
         count[at] = 0;
         state[at] = ARM_LEFT;
-        places = arm_turn_roots(&tables, frame + 12 * at, root);
-        if (places >= 0)
-            places = arm_places(root, places, place);
+        memset(open, 1, sizeof open);
+        places = arm_turn_roots(&tables, frame + 12 * at, ARM_MOVED_ROOT, open, root, 0);
+        if (arm_is_any(open)) {
+            if (!prepared++)
+                arm_prepare_wide(&tables_wide);
+            places = arm_turn_roots_wide(&tables_wide, frame + 12 * at, ARM_INFINITY, open, root, places);
+        }
+        places = arm_is_any(open) ? -1 : arm_places(root, places, place);
         if (wild || places < 0 || !arm_followed(goal, close, place, places, &all))
             continue;
         if (used + all.count > room)

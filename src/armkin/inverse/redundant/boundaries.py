@@ -8,6 +8,7 @@ The product of such an equation over the signs of s and g, over the squares that
 trigonometric polynomial in t of degree 8 at most, whatever branches are real. Between its roots nothing changes.
 """
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -60,10 +61,7 @@ class Boundaries(NamedTuple):
     upper: Array  # (3,) the shoulder, seen before joint 4
     fore: Array  # (3,) the wrist, seen behind joint 4
     wrist: Array  # (3,) seen behind joint 6
-    in_line: float | None  # cosine of joint 4, from its middle, where axes 3 and 5 and the line between both are one
-    offset: float  # squared distance of the wrist: offset - 2 swing cos(q4 - middle)
-    swing: float
-    middle: float
+    in_line: Array | None  # cosine and sine of joint 4 where axes 3 and 5 and the line between both are one
 
 
 @lru_cache(maxsize=64)
@@ -78,23 +76,25 @@ def boundaries(arm: Arm) -> Boundaries | None:
     on5 = perpendicular_foot(L[5])
     wrist = (inverse(L[5]) @ [*on5, 1.0])[:3]
     upper, fore = (inverse(L[3]) @ [*shoulder[1], 1.0])[:3], (L[4] @ [*on5, 1.0])[:3]
-    cos_part, sin_part = upper[:2] @ fore[:2], upper[1] * fore[0] - upper[0] * fore[1]
-    swing = float(np.hypot(cos_part, sin_part))
-    if np.hypot(*wrist[:2]) > tol.EXACT or swing <= tol.NO_LENGTH:
+    if np.hypot(*wrist[:2]) > tol.EXACT or np.hypot(*_apart(upper, fore)) <= tol.NO_LENGTH:
         return None
-    offset = float(upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2])
-    middle = float(np.arctan2(sin_part, cos_part))
-    return Boundaries(arm, L, shoulder[0], upper, fore, wrist, _in_line(L, upper, fore, middle), offset, swing, middle)
+    return Boundaries(arm, L, shoulder[0], upper, fore, wrist, _in_line(L, upper, fore))
 
 
-def _in_line(L: Array, upper: Array, fore: Array, middle: float) -> float | None:
-    """The cosine of joint 4 at which axes 3 and 5 are one line, or None."""
+def _apart(v: Array, w: Array) -> Array:
+    """Cosine and sine of the angle about z from w (3,) to v (3,), times their lengths across it."""
+    return np.array([v[:2] @ w[:2], v[1] * w[0] - v[0] * w[1]])
+
+
+def _in_line(L: Array, upper: Array, fore: Array) -> Array | None:
+    """Cosine and sine (2,) of joint 4 at which axes 3 and 5 are one line, or None."""
     axis3, axis5 = L[3][:3, :3].T @ Z, L[4][:3, 2]
-    cos_part, sin_part = axis3[:2] @ axis5[:2], axis3[1] * axis5[0] - axis3[0] * axis5[1]
-    for q4 in (np.arctan2(sin_part, cos_part), np.arctan2(-sin_part, -cos_part)):
-        turn, line = rotation_about(2, -q4), upper - rotation_about(2, q4) @ fore
+    way = _apart(axis3, axis5)
+    for cos, sin in way / np.hypot(*way), -way / np.hypot(*way):
+        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], Z])
+        line = upper - turn.T @ fore
         if max(np.abs(np.cross(turn @ v, axis5)).max() for v in (axis3, line)) <= tol.EXACT:
-            return float(np.cos(q4 - middle))
+            return np.array([cos, sin])
     return None
 
 
@@ -105,8 +105,18 @@ class _WristFrame:
         self.bounds, self.rotation, self.t = bounds, rotation, t
         self.u = self.seen_behind6(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # to the shoulder
         self.u_square = (self.u * self.u).sum(axis=0)
-        self.cos = (bounds.offset - self.u_square) / (2.0 * bounds.swing)  # cosine of joint 4, from its middle
+        # the wrist's squared distance is offset - 2 swing cos(q4 - middle)
+        upper, fore = bounds.upper, bounds.fore
+        cos_part, sin_part = _apart(upper, fore)
+        swing = np.sqrt(cos_part * cos_part + sin_part * sin_part)
+        self.middle = cos_part / swing, sin_part / swing
+        offset = upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2]
+        self.cos = (offset - self.u_square) / (2.0 * swing)  # cosine of joint 4, from its middle
         self.square = 1.0 - self.cos * self.cos  # square of its sine, s
+
+    def from_middle(self, cos: float, sin: float) -> float:
+        """The cosine of joint 4, of which these are cosine and sine, from its middle."""
+        return self.middle[0] * cos + self.middle[1] * sin
 
     def seen_behind6(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""
@@ -116,7 +126,7 @@ class _WristFrame:
 
     def before5(self, v: Array, origin: Array) -> list[_Rooted]:
         """A vector v (3,) seen before joint 4, less one seen behind it, as seen before joint 5."""
-        c, s = np.cos(self.bounds.middle), np.sin(self.bounds.middle)
+        c, s = self.middle
         # Rz(-q4) v = (vx, vy) cos(q4) + (vy, -vx) sin(q4), and q4 is the middle and an angle
         v_cos, v_sin = np.array([[v[0], v[1], 0.0], [v[1], -v[0], 0.0]])
         R = self.bounds.link[4][:3, :3].T
@@ -153,7 +163,7 @@ def _shoulder(frame: _WristFrame, e0: Array, e3: Array, cosine: float) -> Comple
     product = A * A - g_square * (B * B)
     value = product.product() / (p_square * p_square * cross_square.product())  # over the signs of s
     if bounds.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
-        value = value / (frame.cos - bounds.in_line) ** 2
+        value = value / (frame.cos - frame.from_middle(*bounds.in_line.tolist())) ** 2
     return np.asarray(value)
 
 
@@ -178,7 +188,7 @@ def equations(bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) 
     values = [_shoulder(frame, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
     values += [_shoulder(frame, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
     values += [_shoulder(frame, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    values += [frame.cos - cos for cos in (1.0, -1.0, *(float(np.cos(q - bounds.middle)) for q in limits[3]))]
+    values += [frame.cos - cos for cos in (1.0, -1.0, *(frame.from_middle(math.cos(q), math.sin(q)) for q in limits[3]))]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
         values.append((u[0] * x + u[1] * y + u[2] * z - h).product())
