@@ -19,6 +19,7 @@ from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
 
 PART = Path(__file__).parent / "parts" / "family_places.c"
 MOVED_ROOT = 1e-8  # way [rad] by which bounds of rounding let it move a root, above which more digits are used
+INPUT_SHARE = 0.1  # share of rounding that the target's own numbers have, however many digits are used
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
 
 
@@ -146,10 +147,12 @@ def _roots_code(recorded: recording.Recording, known: list[float], fields: dict[
     given = [f"const {real} v{k} = {number_text(value)};" for k, value in enumerate(known)]
     stores = [f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs)]
     names = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")
-    epsilon = "DBL_EPSILON" if real == "double" else "LDBL_EPSILON"
+    rounding = number_text(tol.ROUNDING)
+    if real != "double":
+        rounding = f"fmaxl({number_text(INPUT_SHARE)}, LDBL_EPSILON / DBL_EPSILON) * {rounding}"
     fields = fields | {name: name + ending for name in names} | {
         "shift": number_text(turn_roots.SHIFT),
-        "rounding": f"({number_text(tol.ROUNDING)} * ({epsilon} / DBL_EPSILON))",
+        "rounding": rounding,
         "equations": "\n".join(f"        {line}" for line in [*given, *code.lines, *stores]),
     }
     return fill_fields(PART.read_text(encoding="utf-8"), fields)

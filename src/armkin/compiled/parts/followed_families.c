@@ -227,6 +227,30 @@ static void arm_ways(const double *goal, const double *near, const arm_pieces *a
     }
 }
 
+/* Where branches merge rounding tells whether they are there: the first values inside of such ends at which they are. */
+static void arm_try_inside(const double *goal, const double *near, arm_pieces *all, const int *index, int count,
+    const double *end, const double *at_end, const double *bound, const double *other)
+{
+    static const double steps[] = {@inside@};
+    double t[ARM_PIECES], cost[ARM_PIECES];
+    int tried[ARM_PIECES];
+    int i, step, left = 0;
+    for (i = 0; i < count; i++)
+        if (at_end[i] == ARM_INFINITY && end[i] == bound[index[i]])
+            tried[left++] = index[i];
+    for (step = 0; step < (int)(sizeof steps / sizeof *steps) && left; step++) {
+        const int open = left;
+        for (i = 0; i < open; i++) {
+            const double from = bound[tried[i]], way = other[tried[i]] - from;
+            t[i] = from + copysign(fmin(steps[step], fabs(way)), way);
+        }
+        arm_costs(goal, near, all, tried, open, t, cost, 0);
+        for (i = left = 0; i < open; i++)
+            if (cost[i] == ARM_INFINITY)
+                tried[left++] = tried[i];
+    }
+}
+
 /* The postures of pieces nearest to `near`, as `_nearest_postures` in Python finds them. */
 static void arm_nearest_postures(const double *goal, const double *near, arm_pieces *all)
 {
@@ -254,8 +278,10 @@ static void arm_nearest_postures(const double *goal, const double *near, arm_pie
         middle[i] = all->cost[p];
     }
     arm_costs(goal, near, all, open, count, t, at_new, 0);
-    arm_costs(goal, near, all, open, count, low, at_new, 0);
-    arm_costs(goal, near, all, open, count, high, at_new, 0);
+    arm_costs(goal, near, all, open, count, low, at_low, 0);
+    arm_costs(goal, near, all, open, count, high, at_high, 0);
+    arm_try_inside(goal, near, all, open, count, low, at_low, all->a, all->b);
+    arm_try_inside(goal, near, all, open, count, high, at_high, all->b, all->a);
     arm_costs(goal, near, all, open, count, left, at_left, 0);
     arm_costs(goal, near, all, open, count, right, at_right, 0);
     for (i = k = 0; i < count; i++) /* beside a kink the motion grows both ways */

@@ -5,7 +5,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from armkin.formula.array_tuples import rows_of, stack_rows
-from armkin.formula.arrays import Array, Bool
+from armkin.formula.arrays import Array, Bool, wrap_angle
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
 from armkin.inverse.redundant.branch_ends import crossed_at, hidden_stretches, number_of, places_of
@@ -122,11 +122,13 @@ def _of_runs(t: Array, runs: SampleRuns, legal: bool, changes: Changes, ends: Ar
     low, centre, high = (value_at(t, runs.row, sample + side) for side in (-1, 0, 1))
     a, b = np.full(len(centre), -np.pi), np.full(len(centre), np.pi)
     cut = np.flatnonzero(runs.length < K)
-    row, first, branch = runs.row[cut], runs.first[cut], runs.branch[cut]
-    middle = centre[cut]
-    begin = ends[number_of(changes, row, (first - 1) % K, branch, K)]
-    end = ends[number_of(changes, row, (first + runs.length[cut] - 1) % K, branch, K)]
-    a[cut], b[cut] = middle - (middle - begin) % (2 * np.pi), middle + (end - middle) % (2 * np.pi)
+    row, branch = runs.row[cut], runs.branch[cut]
+    begin, end = runs.first[cut], runs.first[cut] + runs.length[cut] - 1
+    # an end lies beside the run's last sample, and rounding may put it before that
+    for side, bound, k in ((a, begin, begin - 1), (b, end, end)):
+        value = value_at(t, row, bound)
+        side[cut] = value + wrap_angle(ends[number_of(changes, row, k % K, branch, K)] - value)
+    a, b = np.minimum(a, centre), np.maximum(b, centre)
     low[cut], high[cut] = np.clip(low[cut], a[cut], b[cut]), np.clip(high[cut], a[cut], b[cut])
     return Pieces(runs.row, runs.branch, np.full(len(centre), legal), a, b, a, b, low, centre, high, runs.start)
 
