@@ -120,7 +120,7 @@ def lengths(bounds: Boundaries) -> list[float]:
 
 
 def roots_fields(bounds: Boundaries) -> dict[str, str]:
-    """Values of the fields about polynomials and their roots in parts/followed_families.c."""
+    """Values of the fields about polynomials and their roots in parts/family_branches.c."""
     recorded = recorded_equations(bounds)
     wide = "long double"
     return {

@@ -1,4 +1,4 @@
-"""The C text of families: parts/followed_families.c for an arm, and the closed form of the joints that are not redundant."""
+"""The C text of the families of an arm, with the closed form of the joints that are not redundant."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 PARTS = Path(__file__).parent / "parts"
 INSIDE = 1e-13, 1e-11, 1e-9  # ways [rad] from a branch's end to where it may be there
+PART_NAMES = "family_branches", "family_nearest", "followed_families"
 GOAL = 12  # numbers of a pose
 
 
@@ -56,7 +57,8 @@ def families_code(arm: Arm, redundant: Redundancy) -> str:
         "lower": _numbers(arm.lower),
         "upper": _numbers(arm.upper),
     }
-    return fill_fields((PARTS / "followed_families.c").read_text(encoding="utf-8"), fields)
+    text = "\n".join((PARTS / f"{name}.c").read_text(encoding="utf-8") for name in PART_NAMES)
+    return fill_fields(text, fields)
 
 
 def _others_code(arm: Arm, redundant: Redundancy) -> tuple[str, dict[str, str]]:

@@ -22,6 +22,7 @@ from armkin.inverse.redundant.interval_pieces import Known, Pieces
 if TYPE_CHECKING:
     from armkin.inverse.redundant.other_joints import Follower
 
+SHORT, LEFT = 1, 2  # states of parts/family_branches.c
 AT_ONCE = 500  # targets whose places are found together
 MAX_PIECES = 64  # pieces, at most, of a target in C
 
@@ -58,7 +59,7 @@ class FollowedFamilies:
         row = np.repeat(np.arange(N), count)
         a, b = interval[:total].T.copy()
         pieces = Pieces(row, branch[:total], legal[:total], a, b, a, b, a, a, b, q[:total])
-        known = Known(pieces, np.zeros(N, bool), state == 0, q[:total])
+        known = Known(pieces, state == SHORT, state != LEFT, q[:total])
         rows = np.flatnonzero(~known.complete)
         return _with_followed(follower, known, rows) if len(rows) else known
 

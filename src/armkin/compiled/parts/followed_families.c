@@ -1,351 +1,4 @@
-/* Families of targets of an arm with one joint more than they ask for, the last one: as `armkin.inverse.redundant`, by the
-   closed form of the others, followed along that joint from place to place where anything can change. */
-
-#include <float.h>
-
-#define ARM_TOLD @accepted@ /* squared residual of a branch that is there */
-#define ARM_REACH @reach@ /* rad */
-#define ARM_BESIDE @beside@ /* rad, from a place to the samples on its sides */
-#define ARM_BESIDE_CROSSING @crossing@ /* rad */
-#define ARM_PROBE @probe@ /* share of the way to the next sample */
-#define ARM_SAME_END @same_end@ /* rad */
-#define ARM_MOVED_ROOT @moved_root@ /* rad by which rounding may move a root */
-#define ARM_SAFE @safe@ /* safety factor on the rounding that polynomials show */
-enum {
-    ARM_WAYS = @branches@, /* branches of the others */
-    ARM_COLUMNS = @columns@, ARM_MISSES = @misses@, /* distinct values of joints, and residuals, of these branches */
-    ARM_EVEN = @even@, /* even samples of a turn */
-    ARM_SECTIONS = @sections@, /* steps of the golden section */
-    ARM_PLACES = 128, ARM_PIECES = 64, /* of a target, at most; with more it is left to Python */
-    ARM_SAMPLES = ARM_EVEN + 2 * ARM_PLACES + ARM_LANES,
-    ARM_EQUATIONS = @polynomials@, ARM_DEGREE = @degree@, /* polynomials of a target */
-    ARM_TAIL = @tail@, ARM_TERMS = @terms@, ARM_CELLS = @cells@, ARM_HALVINGS = @halvings@, ARM_NEWTON = @newton@,
-    ARM_SAMPLED = 2 * (ARM_DEGREE + ARM_TAIL) + 1, /* where each is asked */
-    ARM_ANGLES = (ARM_SAMPLED + 7) / 8 * 8, ARM_ORDERS = (ARM_DEGREE + ARM_TAIL + 8) / 8 * 8, /* the same, for vectors */
-    ARM_ROOTS = 256 /* roots of a target, at most */
-};
-enum { ARM_KNOWN = 0, ARM_LEFT = 1 }; /* what becomes of a target: answered, or left to Python */
-
-static const double arm_least[ARM_JOINTS] = {@lower@}, arm_most[ARM_JOINTS] = {@upper@};
-static const int arm_joint_of[ARM_COLUMNS] = {@joint_of@};
-static const int arm_column[ARM_WAYS][ARM_JOINTS] = {@column@}, arm_missed[ARM_WAYS] = {@missed@};
-
-/* Cosine and sine. Coefficients: S. L. Moshier, Cephes Mathematical Library (sin.c). */
-ARM_INLINE void arm_circle(double q, double *cosine, double *sine)
-{
-    const double k = rint(q * 0.6366197723675814);
-    const double r = ((q - k * 1.570796310901641845703125) - k * 1.589325471229585673428e-8)
-        - k * 6.12323399573676588614e-17;
-    const double z = r * r;
-    const double s = r + r * z * (((((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z
-        + 2.75573136213857242213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3) * z
-        - 1.66666666666666307295e-1);
-    const double c = 1.0 - z / 2 + z * z * (((((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z
-        - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3) * z
-        + 4.16666666666665929218e-2);
-    const double half = rint(k / 2), odd = k - 2 * half;
-    const double sign = 1 - 2 * fabs(half - 2 * rint(half / 2));
-    const double across = odd * sign, along = (1 - fabs(odd)) * sign;
-    *cosine = along * c - across * s;
-    *sine = along * s + across * c;
-}
-
-@others@
-@roots@
-@roots_wide@
-/* A number of [0, turn) that differs by whole turns. */
-ARM_INLINE double arm_turned(double x)
-{
-    return x - ARM_TURN * floor(x / ARM_TURN);
-}
-
-ARM_INLINE double arm_wrapped(double x)
-{
-    return x - ARM_TURN * rint(x / ARM_TURN);
-}
-
-/* Values of a joint at their nearest legal copies, which of them are within limits, and how far they are from `near`,
-   added [deg]. */
-ARM_INLINE void arm_copies(int j, double near, double *ARM_RESTRICT value, int *ARM_RESTRICT inside,
-    double *ARM_RESTRICT motion)
-{
-    const double lower = arm_least[j], upper = arm_most[j];
-    int i;
-    for (i = 0; i < ARM_LANES; i++) {
-        const double copy = arm_copy(arm_wrapped(value[i]), near, lower, upper, inside + i);
-        motion[i] += fabs(copy - near) * (180.0 / ARM_PI);
-        value[i] = copy;
-    }
-}
-
-/* What stands of all samples: which branches are there, and legal, as bits; how far they are from `near`, infinite where
-   they are not there. */
-typedef struct {
-    double t[ARM_SAMPLES], cost[ARM_WAYS][ARM_SAMPLES];
-    uint32_t there[ARM_SAMPLES], legal[ARM_SAMPLES];
-    int count;
-} arm_samples;
-
-static void arm_sample(const double *goal, const double *near, arm_samples *all)
-{
-    double value[ARM_COLUMNS * ARM_LANES], miss[ARM_MISSES * ARM_LANES], motion[ARM_COLUMNS * ARM_LANES];
-    int inside[ARM_COLUMNS * ARM_LANES];
-    int start, i, j, b, k;
-    for (start = 0; start < all->count; start += ARM_LANES) {
-        uint32_t there[ARM_LANES] = {0}, legal[ARM_LANES] = {0};
-        arm_others(goal, all->t + start, value, miss);
-        for (k = 0; k < ARM_COLUMNS; k++) {
-            for (i = 0; i < ARM_LANES; i++) {
-                inside[k * ARM_LANES + i] = 1;
-                motion[k * ARM_LANES + i] = 0.0;
-            }
-            arm_copies(arm_joint_of[k], near[arm_joint_of[k]], value + k * ARM_LANES, inside + k * ARM_LANES,
-                motion + k * ARM_LANES);
-        }
-        for (b = 0; b < ARM_WAYS; b++) {
-            const double *missed = miss + arm_missed[b] * ARM_LANES;
-            double cost[ARM_LANES] = {0.0};
-            int fits[ARM_LANES];
-            for (i = 0; i < ARM_LANES; i++)
-                fits[i] = 1;
-            for (j = 0; j < ARM_JOINTS; j++) {
-                const int at = arm_column[b][j] * ARM_LANES;
-                for (i = 0; i < ARM_LANES; i++) {
-                    cost[i] += motion[at + i];
-                    fits[i] &= inside[at + i];
-                }
-            }
-            for (i = 0; i < ARM_LANES; i++) {
-                const int is_there = missed[i] <= ARM_TOLD;
-                all->cost[b][start + i] = is_there ? cost[i] : ARM_INFINITY;
-                there[i] |= (uint32_t)is_there << b;
-                legal[i] |= (uint32_t)(is_there & fits[i]) << b;
-            }
-        }
-        memcpy(all->there + start, there, sizeof there);
-        memcpy(all->legal + start, legal, sizeof legal);
-    }
-}
-
-/* Pieces of the curves of a target: of which branch, whether a legal interval or a family without one, its ends, the value
-   of the best sample and of those beside it, and the posture nearest to `near`, so far. */
-typedef struct {
-    double a[ARM_PIECES], b[ARM_PIECES], low[ARM_PIECES], at[ARM_PIECES], high[ARM_PIECES];
-    double q[ARM_PIECES][ARM_JOINTS], cost[ARM_PIECES];
-    int branch[ARM_PIECES], legal[ARM_PIECES];
-    int count;
-} arm_pieces;
-
-/* One branch each at values t, as its formula has it; which are there. */
-static void arm_own(const double *goal, const int *branch, const double *t, double *q, int *there)
-{
-    double value[ARM_COLUMNS * ARM_LANES], miss[ARM_MISSES * ARM_LANES];
-    int i, j;
-    arm_others(goal, t, value, miss);
-    for (i = 0; i < ARM_LANES; i++) {
-        const int *column = arm_column[branch[i]];
-        for (j = 0; j < ARM_JOINTS; j++)
-            q[j * ARM_LANES + i] = value[column[j] * ARM_LANES + i];
-        there[i] = miss[arm_missed[branch[i]] * ARM_LANES + i] <= ARM_TOLD;
-    }
-}
-
-/* How far one branch each is within the limits, negative beyond them [rad]; not a number where it is not there. */
-static void arm_rooms(const double *goal, const int *branch, const double *t, double *room)
-{
-    double q[ARM_JOINTS * ARM_LANES];
-    int there[ARM_LANES];
-    int i, j;
-    arm_own(goal, branch, t, q, there);
-    for (i = 0; i < ARM_LANES; i++)
-        room[i] = there[i] ? ARM_TURN : NAN;
-    for (j = 0; j < ARM_JOINTS; j++) {
-        const double lower = arm_least[j], upper = arm_most[j];
-        if (!(upper - lower < ARM_TURN))
-            continue;
-        for (i = 0; i < ARM_LANES; i++) {
-            const double left = 0.5 * (upper - lower) - fabs(arm_wrapped(q[j * ARM_LANES + i] - 0.5 * (lower + upper)));
-            room[i] = left < room[i] ? left : room[i];
-        }
-    }
-}
-
-/* How far pieces at values t are from `near`, infinite where they are not legal; better ones are kept, or the first. */
-static void arm_costs(const double *goal, const double *near, arm_pieces *all, const int *index, int count,
-    const double *t, double *cost, int first)
-{
-    int start, i, j;
-    for (start = 0; start < count; start += ARM_LANES) {
-        double q[ARM_JOINTS * ARM_LANES], at[ARM_LANES], motion[ARM_LANES];
-        int branch[ARM_LANES], there[ARM_LANES], inside[ARM_LANES];
-        const int lanes = count - start < ARM_LANES ? count - start : ARM_LANES;
-        for (i = 0; i < ARM_LANES; i++) {
-            const int k = start + (i < lanes ? i : 0);
-            at[i] = t[k];
-            branch[i] = all->branch[index[k]];
-            inside[i] = 1;
-            motion[i] = 0.0;
-        }
-        arm_own(goal, branch, at, q, there);
-        for (j = 0; j < ARM_JOINTS; j++)
-            arm_copies(j, near[j], q + j * ARM_LANES, inside, motion);
-        for (i = 0; i < lanes; i++) {
-            const int p = index[start + i];
-            cost[start + i] = (first || (there[i] & inside[i])) ? motion[i] : ARM_INFINITY;
-            if (first || cost[start + i] < all->cost[p]) {
-                all->cost[p] = cost[start + i];
-                for (j = 0; j < ARM_JOINTS; j++)
-                    all->q[p][j] = q[j * ARM_LANES + i];
-            }
-        }
-    }
-}
-
-/* The postures of one branch each as `arm_costs` has them, their joints' ways from `near`. */
-static void arm_ways(const double *goal, const double *near, const arm_pieces *all, const int *index, int count,
-    const double *t, double (*way)[ARM_JOINTS], double *cost)
-{
-    int start, i, j;
-    for (start = 0; start < count; start += ARM_LANES) {
-        double q[ARM_JOINTS * ARM_LANES], at[ARM_LANES], motion[ARM_LANES];
-        int branch[ARM_LANES], there[ARM_LANES], inside[ARM_LANES];
-        const int lanes = count - start < ARM_LANES ? count - start : ARM_LANES;
-        for (i = 0; i < ARM_LANES; i++) {
-            const int k = start + (i < lanes ? i : 0);
-            at[i] = t[k];
-            branch[i] = all->branch[index[k]];
-            motion[i] = 0.0;
-        }
-        arm_own(goal, branch, at, q, there);
-        for (j = 0; j < ARM_JOINTS; j++)
-            arm_copies(j, near[j], q + j * ARM_LANES, inside, motion);
-        for (i = 0; i < lanes; i++) {
-            cost[start + i] = there[i] ? motion[i] : ARM_INFINITY;
-            for (j = 0; j < ARM_JOINTS; j++)
-                way[start + i][j] = there[i] ? q[j * ARM_LANES + i] - near[j] : NAN;
-        }
-    }
-}
-
-/* Where branches merge rounding tells whether they are there: the first values inside of such ends at which they are. */
-static void arm_try_inside(const double *goal, const double *near, arm_pieces *all, const int *index, int count,
-    const double *end, const double *at_end, const double *bound, const double *other)
-{
-    static const double steps[] = {@inside@};
-    double t[ARM_PIECES], cost[ARM_PIECES];
-    int tried[ARM_PIECES];
-    int i, step, left = 0;
-    for (i = 0; i < count; i++)
-        if (at_end[i] == ARM_INFINITY && end[i] == bound[index[i]])
-            tried[left++] = index[i];
-    for (step = 0; step < (int)(sizeof steps / sizeof *steps) && left; step++) {
-        const int open = left;
-        for (i = 0; i < open; i++) {
-            const double from = bound[tried[i]], way = other[tried[i]] - from;
-            t[i] = from + copysign(fmin(steps[step], fabs(way)), way);
-        }
-        arm_costs(goal, near, all, tried, open, t, cost, 0);
-        for (i = left = 0; i < open; i++)
-            if (cost[i] == ARM_INFINITY)
-                tried[left++] = tried[i];
-    }
-}
-
-/* The postures of pieces nearest to `near`, as `_nearest_postures` in Python finds them. */
-static void arm_nearest_postures(const double *goal, const double *near, arm_pieces *all)
-{
-    const double ratio = 0.6180339887498949;
-    double low[ARM_PIECES], high[ARM_PIECES], left[ARM_PIECES], right[ARM_PIECES], t[ARM_PIECES], middle[ARM_PIECES];
-    double at_left[ARM_PIECES], at_right[ARM_PIECES], at_new[ARM_PIECES], at_low[ARM_PIECES], at_high[ARM_PIECES];
-    double from_low[ARM_PIECES][ARM_JOINTS], from_high[ARM_PIECES][ARM_JOINTS];
-    int open[ARM_PIECES], goes[ARM_PIECES];
-    int i, j, k, step, count = 0;
-    for (i = 0; i < all->count; i++)
-        open[i] = i;
-    arm_costs(goal, near, all, open, all->count, all->at, at_new, 1);
-    for (i = 0; i < all->count; i++)
-        if (all->legal[i])
-            open[count++] = i;
-    for (i = 0; i < count; i++) {
-        const int p = open[i];
-        const double own = near[ARM_JOINTS - 1];
-        const double value = own + rint((all->at[p] - own) / ARM_TURN) * ARM_TURN;
-        t[i] = value >= all->a[p] && value <= all->b[p] ? value : all->at[p];
-        low[i] = all->low[p];
-        high[i] = all->high[p];
-        left[i] = all->at[p] + ARM_PROBE * (low[i] - all->at[p]);
-        right[i] = all->at[p] + ARM_PROBE * (high[i] - all->at[p]);
-        middle[i] = all->cost[p];
-    }
-    arm_costs(goal, near, all, open, count, t, at_new, 0);
-    arm_costs(goal, near, all, open, count, low, at_low, 0);
-    arm_costs(goal, near, all, open, count, high, at_high, 0);
-    arm_try_inside(goal, near, all, open, count, low, at_low, all->a, all->b);
-    arm_try_inside(goal, near, all, open, count, high, at_high, all->b, all->a);
-    arm_costs(goal, near, all, open, count, left, at_left, 0);
-    arm_costs(goal, near, all, open, count, right, at_right, 0);
-    for (i = k = 0; i < count; i++) /* beside a kink the motion grows both ways */
-        if (at_left[i] < middle[i] || at_right[i] < middle[i])
-            open[k++] = open[i];
-    count = k;
-    if (!count)
-        return;
-    for (i = 0; i < count; i++) {
-        low[i] = all->low[open[i]];
-        high[i] = all->high[open[i]];
-        left[i] = high[i] - ratio * (high[i] - low[i]);
-        right[i] = low[i] + ratio * (high[i] - low[i]);
-    }
-    arm_costs(goal, near, all, open, count, left, at_left, 0);
-    arm_costs(goal, near, all, open, count, right, at_right, 0);
-    for (step = 0; step < ARM_SECTIONS; step++) {
-        for (i = 0; i < count; i++) {
-            goes[i] = at_left[i] <= at_right[i];
-            if (goes[i])
-                high[i] = right[i];
-            else
-                low[i] = left[i];
-            t[i] = goes[i] ? high[i] - ratio * (high[i] - low[i]) : low[i] + ratio * (high[i] - low[i]);
-        }
-        arm_costs(goal, near, all, open, count, t, at_new, 0);
-        for (i = 0; i < count; i++) {
-            if (goes[i]) {
-                right[i] = left[i];
-                at_right[i] = at_left[i];
-                left[i] = t[i];
-                at_left[i] = at_new[i];
-            } else {
-                left[i] = right[i];
-                at_left[i] = at_right[i];
-                right[i] = t[i];
-                at_right[i] = at_new[i];
-            }
-        }
-    }
-    arm_ways(goal, near, all, open, count, low, from_low, at_low);
-    arm_ways(goal, near, all, open, count, high, from_high, at_high);
-    for (i = 0; i < count; i++) { /* by a secant where a joint passes its near, by a parabola elsewhere */
-        double a = from_low[i][0], b = from_high[i][0], most = -1.0, x, y;
-        for (j = 0; j < ARM_JOINTS; j++) {
-            const double passes = from_low[i][j] * from_high[i][j] < 0 ? fabs(from_high[i][j] - from_low[i][j]) : 0.0;
-            if (passes > most) {
-                most = passes;
-                a = from_low[i][j];
-                b = from_high[i][j];
-            }
-        }
-        right[i] = at_left[i] <= at_right[i] ? left[i] : right[i]; /* the better one */
-        at_right[i] = at_left[i] <= at_right[i] ? at_left[i] : at_right[i];
-        left[i] = a * b < 0 ? low[i] + (high[i] - low[i]) * a / (a - b) : low[i];
-        x = (right[i] - low[i]) * (at_right[i] - at_high[i]);
-        y = (right[i] - high[i]) * (at_right[i] - at_low[i]);
-        t[i] = right[i] - 0.5 * ((right[i] - low[i]) * x - (right[i] - high[i]) * y) / (x - y);
-        if (!(t[i] > low[i] && t[i] < high[i]))
-            t[i] = right[i];
-    }
-    arm_costs(goal, near, all, open, count, left, at_new, 0);
-    arm_costs(goal, near, all, open, count, t, at_new, 0);
-}
+/* Families of targets, followed along the redundant joint from place to place where anything can change. */
 
 /* Samples evenly over the turn and on both sides of all places, which are sorted. */
 static void arm_spread(const double *place, int places, arm_samples *all)
@@ -477,7 +130,34 @@ static void arm_cross(const double *goal, const int *branch, double *value, int 
     }
 }
 
-/* All pieces of a target, legal ones first; 0 if it is left to Python. */
+/* Whether no joint moves by ARM_REACH along any branch there and back. */
+static int arm_is_short(const double *goal, const arm_samples *all)
+{
+    double value[ARM_COLUMNS * ARM_LANES], miss[ARM_MISSES * ARM_LANES], travel[ARM_WAYS][ARM_JOINTS] = {{0.0}};
+    double last[ARM_COLUMNS], first[ARM_COLUMNS];
+    int b, j, k, most = 1;
+    for (k = 0; k <= all->count; k++) {
+        const int sample = k < all->count ? k : 0, before = k ? k - 1 : 0, lane = k % ARM_LANES;
+        double now[ARM_COLUMNS];
+        if (lane == 0 && k < all->count)
+            arm_others(goal, all->t + k, value, miss);
+        for (j = 0; j < ARM_COLUMNS; j++)
+            now[j] = k < all->count ? value[j * ARM_LANES + lane] : first[j];
+        if (!k)
+            memcpy(first, now, sizeof now);
+        for (b = 0; b < ARM_WAYS && k; b++)
+            for (j = 0; j < ARM_JOINTS; j++)
+                if ((all->there[before] & all->there[sample]) >> b & 1)
+                    travel[b][j] += fabs(arm_wrapped(now[arm_column[b][j]] - last[arm_column[b][j]]));
+        memcpy(last, now, sizeof now);
+    }
+    for (b = 0; b < ARM_WAYS; b++)
+        for (j = 0; j < ARM_JOINTS; j++)
+            most &= 2.0 * travel[b][j] < ARM_REACH;
+    return most;
+}
+
+/* All pieces of a target, legal ones first: what becomes of it. */
 static int arm_followed(const double *goal, const double *near, const double *place, int places, arm_pieces *all)
 {
     static const int both[2] = {1, 0};
@@ -493,7 +173,7 @@ static int arm_followed(const double *goal, const double *near, const double *pl
     K = samples.count;
     if (!arm_changed(&samples, samples.legal, place, places, &crossings)
         || !arm_changed(&samples, samples.there, place, places, &ends))
-        return 0;
+        return ARM_LEFT;
     for (kind = 0; kind < 2; kind++) {
         const int legal = both[kind];
         const uint32_t *bits = legal ? samples.legal : samples.there;
@@ -514,7 +194,7 @@ static int arm_followed(const double *goal, const double *near, const double *pl
                         continue;
                 }
                 if (p == ARM_PIECES)
-                    return 0;
+                    return ARM_LEFT;
                 for (k = first; k < first + length; k++)
                     if (samples.cost[b][k < K ? k : k - K] < samples.cost[b][best < K ? best : best - K])
                         best = k;
@@ -539,8 +219,6 @@ static int arm_followed(const double *goal, const double *near, const double *pl
             }
         }
     }
-    if (any && !wide) /* no joint may move by much: Python tells */
-        return 0;
     arm_cross(goal, crossed, crossing, refined);
     for (i = 0; i < refined; i++)
         end[refined_at[i] / 2][refined_at[i] % 2] = crossing[i];
@@ -555,7 +233,7 @@ static int arm_followed(const double *goal, const double *near, const double *pl
         all->high[i] = fmin(fmax(all->high[i], all->a[i]), all->b[i]);
     }
     arm_nearest_postures(goal, near, all);
-    return 1;
+    return any && !wide && arm_is_short(goal, &samples) ? ARM_SHORT : ARM_KNOWN;
 }
 
 /* Places at which something may change, from the roots of all polynomials and the joint's own limits: sorted, each once. */
@@ -616,7 +294,6 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
             wild |= !(fabs(close[j]) <= ARM_WILD);
         }
         count[at] = 0;
-        state[at] = ARM_LEFT;
         memset(open, 1, sizeof open);
         places = arm_turn_roots(&tables, frame + 12 * at, ARM_MOVED_ROOT, open, root, 0);
         if (arm_is_any(open)) {
@@ -625,11 +302,11 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
             places = arm_turn_roots_wide(&tables_wide, frame + 12 * at, ARM_INFINITY, open, root, places);
         }
         places = arm_is_any(open) ? -1 : arm_places(root, places, place);
-        if (wild || places < 0 || !arm_followed(goal, close, place, places, &all))
+        state[at] = (uint8_t)(wild || places < 0 ? ARM_LEFT : arm_followed(goal, close, place, places, &all));
+        if (state[at] == ARM_LEFT)
             continue;
         if (used + all.count > room)
             return at;
-        state[at] = ARM_KNOWN;
         count[at] = all.count;
         for (i = 0; i < all.count; i++, used++) {
             branch[used] = all.branch[i];
