@@ -1,4 +1,7 @@
-"""The C text of the places where families of an arm may change: the equations of `armkin.inverse.redundant.boundaries`."""
+"""The C text of the places where families of an arm may change: `armkin.inverse.redundant.boundaries` and their roots.
+
+The equations are recorded on complex numbers of symbols, once for numbers of two precisions.
+"""
 
 from __future__ import annotations
 
@@ -18,114 +21,118 @@ from armkin.inverse.redundant import turn_roots
 from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
 
 PART = Path(__file__).parent / "parts" / "family_places.c"
-MOVED_ROOT = 1e-8  # way [rad] by which bounds of rounding let it move a root, above which more digits are used
+MOVED_ROOT = 1e-8  # way [rad] of a root by the bound of its rounding, above which more digits are used
 INPUT_SHARE = 0.1  # share of rounding that the target's own numbers have, however many digits are used
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
+FUNCTIONS = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")  # of C's library
 
 
-def _with_numbers(operation: Callable[[Any, Any], Complex]) -> Callable[[Any, Any], Any]:
+def _with_numbers(operation: Callable[[ComplexNumber, ComplexNumber], ComplexNumber]) -> Callable[[Any, Any], Any]:
     """An operation that leaves arrays to numpy, which does it with each of their numbers."""
 
-    def of_number(one: Any, other: Any) -> Any:
+    def apply(one: ComplexNumber, other: Any) -> Any:
         if isinstance(other, np.ndarray):
             return NotImplemented
-        return operation(one, other if isinstance(other, Complex) else Complex(float(other)))
+        return operation(one, other if isinstance(other, ComplexNumber) else ComplexNumber(float(other)))
 
-    return of_number
+    return apply
 
 
-class Complex:
-    """A complex number whose parts are numbers or recorded symbols, in numpy's arrays of objects."""
+class ComplexNumber:
+    """A complex number whose parts are numbers or symbols, for numpy's arrays of objects."""
 
     def __init__(self, real: Entry, imaginary: Entry = 0.0) -> None:
         self.real, self.imaginary = real, imaginary
 
-    def sqrt(self) -> Complex:
-        assert isinstance(self.imaginary, float), "only roots of real numbers are asked for"
-        return Complex(np.sqrt(self.real))
+    @_with_numbers
+    def __add__(self, b: ComplexNumber) -> ComplexNumber:
+        return ComplexNumber(arrays.add(self.real, b.real), arrays.add(self.imaginary, b.imaginary))
 
     @_with_numbers
-    def __add__(self, b: Complex) -> Complex:
-        return Complex(arrays.add(self.real, b.real), arrays.add(self.imaginary, b.imaginary))
+    def __sub__(self, b: ComplexNumber) -> ComplexNumber:
+        return ComplexNumber(arrays.sub(self.real, b.real), arrays.sub(self.imaginary, b.imaginary))
 
     @_with_numbers
-    def __sub__(self, b: Complex) -> Complex:
-        return Complex(arrays.sub(self.real, b.real), arrays.sub(self.imaginary, b.imaginary))
-
-    @_with_numbers
-    def __mul__(self, b: Complex) -> Complex:
+    def __mul__(self, b: ComplexNumber) -> ComplexNumber:
         real = arrays.sub(arrays.mul(self.real, b.real), arrays.mul(self.imaginary, b.imaginary))
-        return Complex(real, arrays.add(arrays.mul(self.real, b.imaginary), arrays.mul(self.imaginary, b.real)))
+        return ComplexNumber(real, arrays.add(arrays.mul(self.real, b.imaginary), arrays.mul(self.imaginary, b.real)))
 
     @_with_numbers
-    def __truediv__(self, b: Complex) -> Complex:
-        if isinstance(b.imaginary, float) and b.imaginary == 0.0:
-            return Complex(self.real / b.real, self.imaginary / b.real)
-        over = arrays.add(arrays.mul(b.real, b.real), arrays.mul(b.imaginary, b.imaginary))
-        product = self * Complex(b.real, -b.imaginary)
-        return Complex(product.real / over, product.imaginary / over)
-
-    def __pow__(self, exponent: int) -> Complex:
-        assert exponent == 2, "only squares are asked for"
-        return self * self
-
-    def __radd__(self, other: Any) -> Complex:
-        return self + other
+    def __truediv__(self, b: ComplexNumber) -> ComplexNumber:
+        product = ComplexNumber.__mul__(self, ComplexNumber(b.real, arrays.sub(0.0, b.imaginary)))
+        square = arrays.add(arrays.mul(b.real, b.real), arrays.mul(b.imaginary, b.imaginary))
+        return ComplexNumber(product.real / square, product.imaginary / square)
 
     @_with_numbers
-    def __rsub__(self, b: Complex) -> Complex:
-        return b - self
+    def __rsub__(self, b: ComplexNumber) -> ComplexNumber:
+        return ComplexNumber(arrays.sub(b.real, self.real), arrays.sub(b.imaginary, self.imaginary))
 
-    def __rmul__(self, other: Any) -> Complex:
-        return self * other
+    __radd__, __rmul__ = __add__, __mul__
 
-    def __neg__(self) -> Complex:
+    def __neg__(self) -> Any:
         return self * -1.0
 
+    def __pow__(self, exponent: int) -> Any:
+        """Squares alone."""
+        assert exponent == 2
+        return self * self
 
-class Angle:
+    def sqrt(self) -> ComplexNumber:
+        """The root of a real number."""
+        assert isinstance(self.imaginary, float)
+        return ComplexNumber(arrays.sqrt(self.real))
+
+
+class ComplexAngle:
     """A complex angle, known by its cosine and sine."""
 
-    def __init__(self, cosine: Complex, sine: Complex) -> None:
+    def __init__(self, cosine: ComplexNumber, sine: ComplexNumber) -> None:
         self._cosine, self._sine = cosine, sine
 
-    def cos(self) -> Complex:
+    def cos(self) -> ComplexNumber:
+        """For `numpy.cos`."""
         return self._cosine
 
-    def sin(self) -> Complex:
+    def sin(self) -> ComplexNumber:
+        """For `numpy.sin`."""
         return self._sine
 
 
-def recorded_equations(bounds: Boundaries) -> recording.Recording:
-    """The polynomials at one angle; inputs: rotation and shoulder, real and imaginary parts of cosine and sine, and
-    `lengths`, as what follows from these is to be as precise as the numbers are."""
-    known = np.concatenate([bounds.upper, bounds.fore]).tolist()
+def record_equations(bounds: Boundaries) -> recording.Recording:
+    """All polynomials at one angle, real and imaginary parts.
+
+    Inputs: a target's rotation and shoulder, real and imaginary parts of the angle's cosine and sine, and
+    `lengths`, as what follows from them shall be as precise as the numbers are.
+    """
+    places = np.concatenate([bounds.upper, bounds.fore]).tolist()
 
     def formula(x: list[Entry]) -> list[Entry]:
-        entries = np.array([Complex(entry) for entry in x[:INPUTS]], object)
-        angle = Angle(Complex(x[INPUTS], x[INPUTS + 1]), Complex(x[INPUTS + 2], x[INPUTS + 3]))
-        given = iter(x[INPUTS + 4 :])
-        upper, fore = np.array([Complex(next(given) if v else 0.0) for v in known], object).reshape(2, 3)
-        own = bounds._replace(upper=upper, fore=fore)
-        rotation, shoulder = entries[:9].reshape(1, 3, 3), entries[9:].reshape(1, 3)
-        values = equations(own, rotation, shoulder, np.array([angle], object)).ravel()
-        return [part for value in values for part in (value.real, value.imaginary)]
+        numbers = np.array([ComplexNumber(entry) for entry in x[:INPUTS]], object)
+        rotation, shoulder = numbers[:9].reshape(1, 3, 3), numbers[9:].reshape(1, 3)
+        cosine, sine = (ComplexNumber(x[k], x[k + 1]) for k in (INPUTS, INPUTS + 2))
+        symbols = iter(x[INPUTS + 4 :])
+        upper_and_fore = np.array([ComplexNumber(next(symbols) if v else 0.0) for v in places], object)
+        symbolic = bounds._replace(upper=upper_and_fore[:3], fore=upper_and_fore[3:])
+        values: Any = equations(symbolic, rotation, shoulder, np.array([ComplexAngle(cosine, sine)], object))
+        return [part for value in values.ravel() for part in (value.real, value.imaginary)]
 
     return recording.record(formula, INPUTS + 4 + len(lengths(bounds)))
 
 
 def lengths(bounds: Boundaries) -> list[float]:
-    """The numbers, but zeros, that tell where shoulder and wrist are."""
-    return [float(v) for v in [*bounds.upper, *bounds.fore] if v]
+    """Where shoulder and wrist are, seen before and behind joint 4 [reaches], without zeros."""
+    return [float(v) for v in (*bounds.upper, *bounds.fore) if v]
 
 
 def roots_fields(bounds: Boundaries) -> dict[str, str]:
     """Values of the fields about polynomials and their roots in parts/family_branches.c."""
-    recorded = recorded_equations(bounds)
-    wide = "long double"
+    recorded, known = record_equations(bounds), lengths(bounds)
+    single = {"real": "double", "suffix": "", "angles": "ARM_ANGLES", "rounding": number_text(tol.ROUNDING)}
+    wide = {"real": "long double", "suffix": "_wide", "angles": "ARM_SAMPLED"}
+    wide["rounding"] = f"fmaxl({INPUT_SHARE}, LDBL_EPSILON / DBL_EPSILON) * {number_text(tol.ROUNDING)}"
     return {
-        "roots": _roots_code(recorded, lengths(bounds), {"real": "double", "suffix": "", "angles": "ARM_ANGLES"}, ""),
-        "roots_wide": _roots_code(recorded, lengths(bounds), {"real": wide, "suffix": "_wide", "angles": "ARM_SAMPLED"}, "l"),
+        "roots": _roots_code(recorded, known, single, ""),
+        "roots_wide": _roots_code(recorded, known, wide, "l"),
         "polynomials": str(len(recorded.outputs) // 2),
         "degree": str(DEGREE),
         "tail": str(turn_roots.TAIL),
@@ -139,20 +146,14 @@ def roots_fields(bounds: Boundaries) -> dict[str, str]:
 
 
 def _roots_code(recorded: recording.Recording, known: list[float], fields: dict[str, str], ending: str) -> str:
-    """parts/family_places.c for numbers of one precision; known: `lengths`; ending: of the names of C's functions."""
-    inputs = [*(f"g[{k}]" for k in range(INPUTS)), "cr", "ci", "sr", "si", *(f"v{k}" for k in range(len(known)))]
+    """parts/family_places.c for numbers of one precision; known: `lengths`; ending: of its functions in C's library."""
     real, operations = fields["real"], c_and_js_code.C.operations | {"sqrt": f"sqrt{ending}({{}})"}
     language = c_and_js_code.C._replace(real=f"const {real}", operations=operations)
+    names = [f"v{k}" for k in range(len(known))]
+    inputs = [*(f"g[{k}]" for k in range(INPUTS)), "cr", "ci", "sr", "si", *names]
     code = c_and_js_code.write_code(recorded, inputs, language)
-    given = [f"const {real} v{k} = {number_text(value)};" for k, value in enumerate(known)]
-    stores = [f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs)]
-    names = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")
-    rounding = number_text(tol.ROUNDING)
-    if real != "double":
-        rounding = f"fmaxl({number_text(INPUT_SHARE)}, LDBL_EPSILON / DBL_EPSILON) * {rounding}"
-    fields = fields | {name: name + ending for name in names} | {
-        "shift": number_text(turn_roots.SHIFT),
-        "rounding": rounding,
-        "equations": "\n".join(f"        {line}" for line in [*given, *code.lines, *stores]),
-    }
+    lines = [f"const {real} {name} = {number_text(value)};" for name, value in zip(names, known, strict=True)]
+    lines += [*code.lines, *(f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs))]
+    fields = fields | {name: name + ending for name in FUNCTIONS}
+    fields |= {"shift": number_text(turn_roots.SHIFT), "equations": "\n".join(f"        {line}" for line in lines)}
     return fill_fields(PART.read_text(encoding="utf-8"), fields)

@@ -131,18 +131,18 @@ class CompiledArm:
         if workers != 1:
             check_workers(workers)
         library = self._tasks.get(task) or self._library_for(task)
-        if not library.branches:
-            return self._solve_without_form(library, targets, near, rounding)
         if library.turned is not self.arm:
             return self._solve_commanded(library, targets, near, workers, rounding)
+        if not library.branches:
+            return self._solve_without_form(library, targets, near, rounding)
         return library.ik(targets, near, workers, rounding)
 
     def _solve_without_form(
         self, library: CompiledTask, targets: ArrayLike, near: ArrayLike | None, rounding: ArrayLike | None
     ) -> Solutions:
-        """Solutions of `armkin.ik`; for a redundant joint, machine code follows its families, or solves for the others."""
+        """Solutions of `armkin.ik`; for a redundant joint by machine code for its families, or for the other joints."""
         if (redundant := redundancy(self.arm, library.name)) is not None:
-            curves_of = library.families and library.families.curves_of
+            curves_of = None if library.families is None else library.families.curves_of
             return families(_solve_others, self.arm, redundant, targets, near, rounding, curves_of)
         return solve.ik(self.arm, targets, library.name, near=near, rounding=rounding)
 

@@ -49,14 +49,13 @@ class CompiledTask:
         solved_task, form = _class_of(self.turned, task)
         if solved_task is not None and form is not None:  # an elimination named after a class is that elimination in C
             form = class_forms.plain_form(self.turned, solved_task, form) if form.places is not None else form
-        redundant = redundancy(self.turned, task)
-        has_families = families_source.has_form(self.turned, redundant)
-        library = c_source.library(arm, self.turned, solved_task, form, redundant if has_families else None)
+        followed = families_source.followed_redundancy(arm, task)
+        library = c_source.library(arm, self.turned, solved_task, form, followed)
         code = toolchain.load_library(library.text, library.content, library.level)
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self.joint_functions = JointFunctions(arm, code)
         self.branches = library.branches
-        self.families = FollowedFamilies(code) if has_families else None
+        self.families = FollowedFamilies(code) if followed is not None else None
         if not self.branches:
             return
         self.task, self.geometry = solver(self.turned, task)

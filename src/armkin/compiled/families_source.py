@@ -17,8 +17,9 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.arm_angle import arm_angle
 from armkin.inverse.redundant.boundaries import boundaries
 from armkin.inverse.redundant.followed_branches import EVEN_SAMPLES, STEPS
-from armkin.inverse.solvers.choose_redundant_joint import move_entries
+from armkin.inverse.solvers.choose_redundant_joint import move_entries, redundancy
 from armkin.inverse.solvers.solver_of_arm import solver
+from armkin.model.arm import actual_arm
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Entry
@@ -31,15 +32,18 @@ PART_NAMES = "family_branches", "family_nearest", "followed_families"
 GOAL = 12  # numbers of a pose
 
 
-def has_form(arm: Arm, redundant: Redundancy | None) -> bool:
-    """Whether the families of an arm, in actual joint values, are followed in C."""
-    if redundant is None or arm.keep_out or redundant.joint != arm.n - 1 or redundant.task.orientation != "full":
-        return False
-    return redundant.by_formula and arm_angle(arm) is None and boundaries(arm) is not None
+def followed_redundancy(arm: Arm, task: str | None) -> Redundancy | None:
+    """The redundant joint of an arm whose families are followed in C; None for every other arm."""
+    redundant = redundancy(arm, task)
+    if redundant is None or redundant.joint != arm.n - 1 or redundant.task.orientation != "full":
+        return None
+    if arm.keep_out or actual_arm(arm) is not arm or not redundant.by_formula or arm_angle(arm) is not None:
+        return None
+    return redundant if boundaries(arm) is not None else None
 
 
 def families_code(arm: Arm, redundant: Redundancy) -> str:
-    """`arm_families` of an arm, in actual joint values."""
+    """`arm_families` of an arm."""
     form, fields = _others_code(arm, redundant)
     bounds = boundaries(arm)
     assert bounds is not None
@@ -62,9 +66,9 @@ def families_code(arm: Arm, redundant: Redundancy) -> str:
 
 
 def _others_code(arm: Arm, redundant: Redundancy) -> tuple[str, dict[str, str]]:
-    """`arm_others`, all branches of a target at values of the redundant joint, and the fields that tell where they stand.
+    """`arm_others`, all branches of a target at values of the redundant joint, and fields that tell where each stands.
 
-    Values that branches share stand there once.
+    What branches share stands there once.
     """
     rest_form = recorded_formula(redundant.rest, solver(redundant.rest, redundant.task.name)[0], redundant.geometry)
     n = arm.n

@@ -15,7 +15,7 @@ import numpy as np
 from armkin.formula import arrays
 from armkin.formula.array_tuples import rows_of, stack_rows
 from armkin.inverse.redundant.boundaries import boundaries, from_joint7
-from armkin.inverse.redundant.families import _nearest_postures
+from armkin.inverse.redundant.families import Curves, _nearest_postures
 from armkin.inverse.redundant.followed_branches import Followed
 from armkin.inverse.redundant.interval_pieces import Known, Pieces
 
@@ -36,7 +36,7 @@ class FollowedFamilies:
         self._call.argtypes = [size, pointer, pointer, pointer, size, size, *[pointer] * 6]
         self._call.restype = size
 
-    def curves_of(self, follower: Follower) -> Iterator[Known]:
+    def curves_of(self, follower: Follower) -> Iterator[Curves]:
         """Curves of all targets, some at a time."""
         for rows in arrays.slices(len(follower.target), AT_ONCE):
             yield self._known(follower.of(rows))

@@ -115,8 +115,9 @@ class _WristFrame:
         self.square = 1.0 - self.cos * self.cos  # square of its sine, s
 
     def from_middle(self, cos: float, sin: float) -> float:
-        """The cosine of joint 4, of which these are cosine and sine, from its middle."""
-        return self.middle[0] * cos + self.middle[1] * sin
+        """The cosine of joint 4 from its middle, by its cosine and sine."""
+        cosine: float = self.middle[0] * cos + self.middle[1] * sin
+        return cosine
 
     def seen_behind6(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""
@@ -188,7 +189,9 @@ def equations(bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) 
     values = [_shoulder(frame, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
     values += [_shoulder(frame, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
     values += [_shoulder(frame, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    values += [frame.cos - cos for cos in (1.0, -1.0, *(frame.from_middle(math.cos(q), math.sin(q)) for q in limits[3]))]
+    values += [
+        frame.cos - cos for cos in (1.0, -1.0, *(frame.from_middle(math.cos(q), math.sin(q)) for q in limits[3]))
+    ]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
         values.append((u[0] * x + u[1] * y + u[2] * z - h).product())
