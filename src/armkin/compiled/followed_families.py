@@ -1,7 +1,7 @@
 """Families of arms whose other joints have a closed form, followed along the redundant joint by machine code.
 
-parts/followed_families.c does what `armkin.inverse.redundant.followed_branches` does where all places of a change are
-known, and says which targets it leaves to Python.
+parts/followed_families.c does what `armkin.inverse.redundant` does where all places of a change are known, finds each
+family's posture nearest to near, and says which targets it leaves to Python.
 """
 
 from __future__ import annotations
@@ -12,8 +12,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from armkin.compiled.families_source import MAX_PIECES
 from armkin.formula import arrays
-from armkin.formula.array_tuples import rows_of, stack_rows
+from armkin.formula.array_tuples import stack_rows
+from armkin.formula.arrays import Int
 from armkin.inverse.redundant.boundaries import boundaries, from_joint7
 from armkin.inverse.redundant.families import Curves, _nearest_postures
 from armkin.inverse.redundant.followed_branches import Followed
@@ -22,9 +24,8 @@ from armkin.inverse.redundant.interval_pieces import Known, Pieces
 if TYPE_CHECKING:
     from armkin.inverse.redundant.other_joints import Follower
 
-SHORT, LEFT = 1, 2  # states of parts/family_branches.c
-AT_ONCE = 500  # targets whose places are found together
-MAX_PIECES = 64  # pieces, at most, of a target in C
+AT_ONCE = 500  # targets whose curves are asked together
+SHORT_STATE, LEFT_STATE = 1, 2  # of parts/family_branches.c: no joint moves by much; the target is left to Python
 
 
 class FollowedFamilies:
@@ -33,45 +34,42 @@ class FollowedFamilies:
     def __init__(self, code: ctypes.CDLL) -> None:
         pointer, size = ctypes.c_void_p, ctypes.c_int64
         self._call = code.arm_families
-        self._call.argtypes = [size, pointer, pointer, pointer, size, size, *[pointer] * 6]
-        self._call.restype = size
+        self._call.argtypes, self._call.restype = [size, pointer, pointer, pointer, size, *[pointer] * 6], None
 
     def curves_of(self, follower: Follower) -> Iterator[Curves]:
         """Curves of all targets, some at a time."""
         for rows in arrays.slices(len(follower.target), AT_ONCE):
-            yield self._known(follower.of(rows))
+            part = follower.of(rows)
+            known = self._known(part)
+            left = np.flatnonzero(~known.complete)
+            yield _with_followed(part, known, left) if len(left) else known
 
     def _known(self, follower: Follower) -> Known:
-        """Curves of some targets, of which Python follows those that C leaves to it."""
-        N, n = len(follower.target), follower.arm.n
+        """Curves of some targets, none of those that are left to Python, which are not complete."""
         bounds = boundaries(follower.arm)
         assert bounds is not None
+        (N, n), room = follower.near.shape, len(follower.target) * MAX_PIECES
         rotation, shoulder = from_joint7(bounds, follower.target)
         frame = np.concatenate([rotation.reshape(N, 9), shoulder], axis=1)
         target, near = np.ascontiguousarray(follower.target), np.ascontiguousarray(follower.near)
         state, count = np.empty(N, np.uint8), np.empty(N, np.int64)
-        room = N * MAX_PIECES
         branch, legal = np.empty(room, np.int64), np.empty(room, bool)
         interval, q = np.empty((room, 2)), np.empty((room, n))
-        pointers = (x.ctypes.data for x in (state, count, branch, legal, interval, q))
-        self._call(N, target.ctypes.data, frame.ctypes.data, near.ctypes.data, n, room, *pointers)
-        total = int(count.sum())
-        row = np.repeat(np.arange(N), count)
-        a, b = interval[:total].T.copy()
-        pieces = Pieces(row, branch[:total], legal[:total], a, b, a, b, a, a, b, q[:total])
-        known = Known(pieces, state == SHORT, state != LEFT, q[:total])
-        rows = np.flatnonzero(~known.complete)
-        return _with_followed(follower, known, rows) if len(rows) else known
+        outputs = (x.ctypes.data for x in (state, count, branch, legal, interval, q))
+        self._call(N, target.ctypes.data, frame.ctypes.data, near.ctypes.data, n, *outputs)
+        used = slice(0, int(count.sum()))
+        row, q = np.repeat(np.arange(N), count), q[used]
+        a, b = interval[used].T
+        pieces = Pieces(row, branch[used], legal[used], a, b, a, b, a, a, b, q)
+        return Known(pieces, state == SHORT_STATE, state != LEFT_STATE, q)
 
 
-def _with_followed(follower: Follower, known: Known, rows: arrays.Int) -> Known:
-    """The curves with those of some targets, rows (M,), by Python."""
-    part = follower.of(rows)
+def _with_followed(follower: Follower, known: Known, left: Int) -> Known:
+    """The curves with those of targets left to Python (M,)."""
+    part = follower.of(left)
     followed = Followed.along(part)
-    nearest = _nearest_postures(part.arm, followed, part.near[followed.pieces.row])
-    kept = ~np.isin(known.pieces.row, rows)
-    pieces = followed.pieces._replace(row=rows[followed.pieces.row])
-    known.short[rows], known.complete[rows] = followed.short, followed.complete
-    return known._replace(
-        pieces=stack_rows([rows_of(known.pieces, kept), pieces]), nearest=np.concatenate([known.nearest[kept], nearest])
-    )
+    pieces = followed.pieces
+    nearest = _nearest_postures(part.arm, followed, part.near[pieces.row])
+    known.short[left], known.complete[left] = followed.short, followed.complete
+    pieces = stack_rows([known.pieces, pieces._replace(row=left[pieces.row])])
+    return known._replace(pieces=pieces, nearest=np.concatenate([known.nearest, nearest]))

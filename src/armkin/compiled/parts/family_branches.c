@@ -16,7 +16,7 @@ enum {
     ARM_COLUMNS = @columns@, ARM_MISSES = @misses@, /* distinct values of joints, and residuals, of these branches */
     ARM_EVEN = @even@, /* even samples of a turn */
     ARM_SECTIONS = @sections@, /* steps of the golden section */
-    ARM_PLACES = 128, ARM_PIECES = 64, /* of a target, at most; with more it is left to Python */
+    ARM_PLACES = 128, ARM_PIECES = @pieces@, /* of a target, at most; with more it is left to Python */
     ARM_SAMPLES = ARM_EVEN + 2 * ARM_PLACES + ARM_LANES,
     ARM_EQUATIONS = @polynomials@, ARM_DEGREE = @degree@, /* polynomials of a target */
     ARM_TAIL = @tail@, ARM_TERMS = @terms@, ARM_CELLS = @cells@, ARM_HALVINGS = @halvings@, ARM_NEWTON = @newton@,

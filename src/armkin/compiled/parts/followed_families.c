@@ -271,10 +271,9 @@ ARM_INLINE int arm_is_any(const uint8_t *open)
 
 /* Families of n targets, poses row by row. frame: the same as the frame behind the last joint, its rotation row by row and
    the shoulder seen there. near: as of `arm_batch`. Pieces stand one after the other: count of each target, then of each
-   piece its branch, whether it is legal, its ends and its posture, for up to `room` of them. Returns how many targets there
-   was room for. */
-int64_t arm_families(int64_t n, const double *target, const double *frame, const double *near, int64_t near_step,
-    int64_t room, uint8_t *state, int64_t *count, int64_t *branch, uint8_t *legal, double *interval, double *q)
+   piece its branch, whether it is legal, its ends and its posture; there is room for ARM_PIECES of each target. */
+void arm_families(int64_t n, const double *target, const double *frame, const double *near, int64_t near_step,
+    uint8_t *state, int64_t *count, int64_t *branch, uint8_t *legal, double *interval, double *q)
 {
     arm_tables tables;
     arm_tables_wide tables_wide;
@@ -293,7 +292,6 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
             close[j] = near[at * near_step + j];
             wild |= !(fabs(close[j]) <= ARM_WILD);
         }
-        count[at] = 0;
         memset(open, 1, sizeof open);
         places = arm_turn_roots(&tables, frame + 12 * at, ARM_MOVED_ROOT, open, root, 0);
         if (arm_is_any(open)) {
@@ -302,20 +300,17 @@ int64_t arm_families(int64_t n, const double *target, const double *frame, const
             places = arm_turn_roots_wide(&tables_wide, frame + 12 * at, ARM_INFINITY, open, root, places);
         }
         places = arm_is_any(open) ? -1 : arm_places(root, places, place);
+        count[at] = 0;
         state[at] = (uint8_t)(wild || places < 0 ? ARM_LEFT : arm_followed(goal, close, place, places, &all));
         if (state[at] == ARM_LEFT)
             continue;
-        if (used + all.count > room)
-            return at;
         count[at] = all.count;
         for (i = 0; i < all.count; i++, used++) {
             branch[used] = all.branch[i];
             legal[used] = (uint8_t)all.legal[i];
             interval[2 * used] = all.a[i];
             interval[2 * used + 1] = all.b[i];
-            for (j = 0; j < ARM_JOINTS; j++)
-                q[ARM_JOINTS * used + j] = all.q[i][j];
+            memcpy(q + ARM_JOINTS * used, all.q[i], sizeof all.q[i]);
         }
     }
-    return n;
 }
