@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,10 @@ import armkin
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 from redundant_arms import covers_value, held_answers, redundant_postures
 
+from armkin.compiled.families_source import followed_redundancy
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
+
+Ik = Callable[[np.ndarray], armkin.Solutions]
 
 ARMS = ("panda", "iiwa7", "kinova_gen3")
 AT_ONCE = 250
@@ -28,22 +32,24 @@ END = 1e-8  # [rad]
 
 def main() -> None:
     count, brute = (int(word) for word in (sys.argv[1:] + ["10000", "20"][len(sys.argv) - 1 :]))
-    print("arm          targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
+    print("arm             targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
     for name in ARMS:
-        print(family_row(name, count, brute), flush=True)
+        arm = armkin.load(name)
+        print(family_row(name, arm, lambda target, arm=arm: armkin.ik(arm, target), count, brute), flush=True)
+        if followed_redundancy(arm, None) is not None:
+            print(family_row(f"{name} compiled", arm, armkin.compile(arm).ik, count, brute), flush=True)
 
 
-def family_row(name: str, count: int, brute: int) -> str:
-    arm = armkin.load(name)
+def family_row(name: str, arm: armkin.Arm, ik: Ik, count: int, brute: int) -> str:
     redundant = redundancy(arm, None)
     assert redundant is not None
     q, target = redundant_postures(arm, None, count, 11)
-    armkin.ik(arm, target[:1])
+    ik(target[:1])
     lost = missed = rows = 0
     spent = 0.0
     for begin in range(0, count, AT_ONCE):
         start = time.process_time()
-        s = armkin.ik(arm, target[begin : begin + AT_ONCE])
+        s = ik(target[begin : begin + AT_ONCE])
         spent += time.process_time() - start
         assert s.interval is not None
         rows += int(s.within_limits.sum())
@@ -55,18 +61,18 @@ def family_row(name: str, count: int, brute: int) -> str:
     alone = []
     for k in range(20):
         start = time.process_time()
-        armkin.ik(arm, target[k])
+        ik(target[k])
         alone.append(time.process_time() - start)
-    places, wrong_counts = by_brute_force(arm, redundant.joint, target[:brute])
+    places, wrong_counts = by_brute_force(arm, ik, redundant.joint, target[:brute])
     return (
-        f"{name:12s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
+        f"{name:15s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
         f" {lost:5d} {missed:7d} {places:13d} {wrong_counts:9d}"
     )
 
 
-def by_brute_force(arm: armkin.Arm, joint: int, target: np.ndarray) -> tuple[int, int]:
+def by_brute_force(arm: armkin.Arm, ik: Ik, joint: int, target: np.ndarray) -> tuple[int, int]:
     """How many places were asked, and at how many the listed intervals and the arm with the joint held disagree."""
-    s, places, wrong_counts = armkin.ik(arm, target), 0, 0
+    s, places, wrong_counts = ik(target), 0, 0
     assert s.interval is not None
     for k in range(len(target)):
         legal = s.interval[k][s.within_limits[k]]

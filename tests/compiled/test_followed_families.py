@@ -140,11 +140,11 @@ def scaled(target: np.ndarray, scale: np.ndarray) -> np.ndarray:
 def test_where_rounding_decides_python_is_asked() -> None:
     """Postures at multiples of 30 degrees: several things happen at one place."""
     arm = armkin.load("panda")
-    q = np.deg2rad(30.0 * np.random.default_rng(1).integers(-6, 7, (100, arm.n)))
+    q = np.deg2rad(30.0 * np.random.default_rng(1).integers(-6, 7, (300, arm.n)))
     target = armkin.fk(arm, np.clip(q, arm.lower, arm.upper))
     python, compiled = armkin.ik(arm, target), armkin.compile(arm).ik(target)
     assert not (python.complete & ~compiled.complete).any()
-    assert 0 < (~compiled.complete).sum() < (~python.complete).sum()
+    assert 15 <= (~compiled.complete).sum() <= (~python.complete).sum()
 
 
 def test_a_posture_that_stands_on_its_target_stays() -> None:

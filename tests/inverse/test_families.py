@@ -321,7 +321,16 @@ def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
     arm = armkin.load("panda")
     q, target = redundant_postures(arm, None, 2, 7)
     fast, python = armkin.compile(arm).ik(target, "pose", near=q), armkin.ik(arm, target, near=q)
-    np.testing.assert_allclose(fast.q, python.q, atol=1e-9)
+    np.testing.assert_allclose(fast.q, python.q, atol=1e-6)  # where branches merge rounding moves joints by its root
+
+
+def test_an_end_before_its_best_sample_by_rounding_is_no_whole_turn() -> None:
+    """Of 300 postures of whole degrees 19 had an interval of a whole turn, of a joint that turns by 332 degrees."""
+    arm = armkin.load("panda")
+    q = np.deg2rad(np.random.default_rng(5).integers(-160, 160, (300, arm.n)) * 1.0).clip(arm.lower, arm.upper)
+    s = armkin.ik(arm, armkin.fk(arm, q), near=q)
+    assert s.interval is not None
+    assert (np.ptp(s.interval[s.within_limits], axis=1) < 5.8).all()
 
 
 @pytest.mark.parametrize(
@@ -331,7 +340,7 @@ def test_a_batch_of_a_redundant_arm_may_be_compiled() -> None:
             [0, -180, -90, 0, 0, 0, -180],
             [-180, -135, -180, 60, 15, 60, -90],
         ),  # where something may change is not known
-        *([-45, -180, -135, -90, -45, 90, -180], [-30, -60, 135, 120, -90, -135, 165]),  # or does not explain a change
+        *([-45, 135, -135, 30, 90, 135, 15], [-30, -60, 135, 120, -90, -135, 165]),  # or does not explain a change
     ],
 )
 def test_a_target_whose_changes_nobody_explains_is_sampled_alone_as_in_a_batch(degrees: list[int]) -> None:
