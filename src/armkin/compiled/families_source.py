@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 PARTS = Path(__file__).parent / "parts"
-INSIDE = 1e-13, 1e-11, 1e-9  # ways [rad] from a branch's end to where it may be there
+INSIDE_STEPS = 1e-13, 1e-11, 1e-9  # ways [rad] from a branch's end to where it may be there
 PART_NAMES = "family_branches", "family_nearest", "followed_families"
 MAX_PIECES = 64  # pieces, at most, of a target in C
 GOAL = 12  # numbers of a pose
@@ -56,7 +56,7 @@ def families_code(arm: Arm, redundant: Redundancy) -> str:
         "crossing": number_text(tol.BESIDE_CROSSING),
         "probe": number_text(tol.PROBE_SHARE),
         "same_end": number_text(tol.SAME_END),
-        "inside": ", ".join(map(number_text, INSIDE)),
+        "inside": ", ".join(map(number_text, INSIDE_STEPS)),
         "pieces": str(MAX_PIECES),
         "even": str(EVEN_SAMPLES),
         "sections": str(STEPS),
