@@ -123,7 +123,7 @@ def jacobian(arm: Arm, q: ArrayLike) -> Jacobians:
 def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     """`fk` and `jacobian` in one, at little more than the cost of the latter: (..., 4, 4) and (..., 6, n)."""
     values = as_joints(arm, q)
-    entries = _run_batched(arm, values, (16 + 6 * arm.n,), _pose_and_jacobian)
+    entries = _run_batched(arm, values, (16 + 6 * arm.n,), pose_and_jacobian)
     batch_shape = values.shape[:-1]
     return entries[..., :16].reshape(*batch_shape, 4, 4), entries[..., 16:].reshape(*batch_shape, 6, arm.n)
 
@@ -243,10 +243,10 @@ def _frames_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
 
 def jacobian_formula(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The Jacobian, row by row: 6 n entries."""
-    return _pose_and_jacobian(arm, q)[16:]
+    return pose_and_jacobian(arm, q)[16:]
 
 
-def _pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
+def pose_and_jacobian(arm: Arm, q: Sequence[Motion]) -> list[Entry]:
     """The tool's pose and the Jacobian, row by row: 16 + 6 n entries."""
     P = pose.constant(arm.link[0])
     axes = []

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import ArrayLike
 
+from armkin.compiled.compiled_curves import compiled_curves
 from armkin.compiled.compiled_task import CompiledTask
 from armkin.engines.threads import check_workers
 from armkin.formula.arrays import Array
 from armkin.inverse import solve
 from armkin.inverse.answers.solutions import Solutions
-from armkin.inverse.redundant.families import families
-from armkin.inverse.solvers.choose_redundant_joint import redundancy
+from armkin.inverse.redundant.families import CurvesOf, families
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, redundancy
 from armkin.inverse.tasks.choose_task import default_task
 
 if TYPE_CHECKING:
@@ -142,9 +143,17 @@ class CompiledArm:
     ) -> Solutions:
         """Solutions of `armkin.ik`; for a redundant joint by machine code for its families, or for the other joints."""
         if (redundant := redundancy(self.arm, library.name)) is not None:
-            curves_of = None if library.families is None else library.families.curves_of
-            return families(_solve_others, self.arm, redundant, targets, near, rounding, curves_of)
+            others = _solve_others if library.families is None else solve.ik  # asked for the names of branches alone
+            curves_of = self._curves_of(library, redundant)
+            return families(others, self.arm, redundant, targets, near, rounding, curves_of)
         return solve.ik(self.arm, targets, library.name, near=near, rounding=rounding)
+
+    def _curves_of(self, library: CompiledTask, redundant: Redundancy) -> CurvesOf | None:
+        """What finds curves of families in machine code, followed or traced; None where numpy does."""
+        if library.families is not None:
+            return library.families.curves_of
+        traced = compiled_curves(self.arm, redundant)
+        return None if traced is None else traced.of(_held_answers)
 
     def _solve_commanded(
         self,
@@ -183,3 +192,8 @@ class CompiledArm:
 def _solve_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = True, **options: Any) -> Solutions:
     """`armkin.ik` by machine code for an arm with its redundant joint held."""
     return compile(arm, task).ik(targets, task, **options)
+
+
+def _held_answers(arm: Arm, targets: Array) -> Array:
+    """All answers (N, B, n) of targets (N, 4, 4) by machine code for an arm with a joint held, nan for none."""
+    return compile(arm, "pose")._library_for("pose").answers(targets)

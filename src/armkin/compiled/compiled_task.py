@@ -84,6 +84,12 @@ class CompiledTask:
             return solutions
         return self._solve_batch(targets, near, workers, stated)
 
+    def answers(self, target: Array) -> Array:
+        """All branches (N, B, n) of targets (N, 4, 4) as they are, nan for none: neither moved nor examined."""
+        if self._elimination is None:
+            return self.ik(target, None, 1).q
+        return self._elimination.answers(target)
+
     def _solve_batch(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
     ) -> Solutions:

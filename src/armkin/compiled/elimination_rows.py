@@ -38,6 +38,10 @@ class CompiledElimination:
         """Which targets (N, 4, 4) have complete and isolated branches in C: (N,)."""
         return np.asarray(self._call_c(target)[1] < UNSURE_STATE)
 
+    def answers(self, target: Array) -> Array:
+        """Branches (N, B, n) of targets, nan for none; unsure ones as C has found them, not examined by Python."""
+        return self._call_c(target)[0]
+
     def _call_c(self, target: Array) -> tuple[Array, NDArray[np.uint8]]:
         """Branches (N, B, n) of targets, nan after the last, and the states (N,) of the targets."""
         goal = np.ascontiguousarray(target)

@@ -89,9 +89,8 @@ class Ways(NamedTuple):
         offset = self.chord * (u * u * (3.0 - 2.0 * u)) + (self.begin * (1.0 - u) - self.end * u) * (u * (1.0 - u))
         return np.asarray(self.q + offset * radian_or_reach(follower.arm))
 
-    def slope(self, share: Array | float, j: int) -> Array:
-        """The derivative (M,) [rad, reaches] of joint j by the share of the way, at shares (M,) or one."""
-        u = share
+    def slope(self, u: Array | float, j: int) -> Array:
+        """The derivative (M,) [rad, reaches] of joint j by the share of the way, at shares u (M,) or one."""
         ends = self.begin[:, j] * (1.0 - u) * (1.0 - 3.0 * u) + self.end[:, j] * u * (3.0 * u - 2.0)
         return np.asarray(6.0 * u * (1.0 - u) * self.chord[:, j] + ends)
 

@@ -56,9 +56,7 @@ class Planes(NamedTuple):
 
     def held(self, count: int) -> Array:
         """Directions (M, n) in which that joint alone moves."""
-        directions = np.zeros((count, self.follower.arm.n))
-        directions[:, self.guide.joint] = 1.0
-        return directions
+        return np.tile(np.eye(self.follower.arm.n)[self.guide.joint], (count, 1))
 
     def place(self, row: Int, plane: Int) -> Int:
         """One number for targets and their planes (M,), counted round the turn."""
@@ -125,7 +123,9 @@ def _answers_between(source: Follower, t: Array, defect: Array) -> tuple[Int, Ar
     row, k = np.nonzero(may_turn_back(misses, np.broadcast_to(t, defect.shape[:2])).any(axis=2))
     row, values = np.repeat(row, len(part)), (t[k, None] + width * part).ravel()
     q, defect = source.candidates(row, values)
-    best_row = defect.min(axis=1).reshape(-1, len(part)).argmin(axis=1) + len(part) * np.arange(len(k))
+    least = defect.min(axis=1).reshape(-1, len(part))
+    best = least <= np.maximum(least.min(axis=1, keepdims=True), tol.ACCEPTED)  # the middle one where several are exact
+    best_row = (best.cumsum(axis=1) > best.sum(axis=1)[:, None] // 2).argmax(axis=1) + len(part) * np.arange(len(k))
     place, branch = np.nonzero(defect[best_row] < tol.NEAR_DEFECT)
     row, q = row[best_row[place]], q[best_row[place], branch]
     q, miss = newton.correct(source.arm, source.redundant.task, q, source.target[row])

@@ -44,6 +44,7 @@ FREE_STEP = np.deg2rad(0.1)  # step [rad] of the parameter between postures that
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
 # `complete` (N,), and whether no joint moves by REACH along any, `short` (N,); `steps` of the golden section.
 Curves = Turning | Followed | Traced | Known
+CurvesOf = Callable[[Follower], Iterator[Curves]]  # the curves of all targets, some at a time
 
 
 def families(
@@ -53,12 +54,12 @@ def families(
     targets: ArrayLike,
     near: ArrayLike | None,
     rounding: ArrayLike | None,
-    curves_of: Callable[[Follower], Iterator[Curves]] | None = None,
+    curves_of: CurvesOf | None = None,
 ) -> Solutions:
     """Legal intervals of the redundant joint, and families without one: `armkin.ik` of such an arm.
 
-    q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad]. curves_of: the curves
-    of all targets, some at a time, by default `curves_in_numpy`.
+    q: (..., B, n) of each the posture nearest to near; `Solutions.interval`: (..., B, 2) [rad]. curves_of: by
+    default `curves_in_numpy`.
     """
     if redundant.about_tool_axis:
         return _with_tool_turn(ik, arm, redundant, targets, near, rounding)
@@ -176,7 +177,7 @@ class _Rows:
         q[near_rows] = _with_near(self.arm, self.joint, rows_of(pieces, near_rows), q[near_rows], near[near_rows])
         if self.arm.keep_out and not isinstance(curves, Known):
             q = _with_free_postures(self.arm, curves, q, near)
-        full_turn = pieces.b - pieces.a >= 2 * np.pi
+        full_turn = pieces.b - pieces.a > 2 * np.pi - tol.SAME_END
         ends = np.stack([pieces.a, pieces.b], axis=1)
         # the interval is shifted by whole turns to where the posture lies
         ends += (2 * np.pi) * np.round((q[:, self.joint] - ends.mean(axis=1)) / (2 * np.pi))[:, None]

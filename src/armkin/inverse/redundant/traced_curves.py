@@ -96,8 +96,7 @@ class _Curves:
 
     def slab(self, half: Int) -> Int:
         """In which slab between two planes halves are: the plane below it."""
-        row = self.nodes.row[half >> 1]
-        return np.asarray((self.nodes.plane[half >> 1] - (half & 1)) % self.planes.counts[row])
+        return np.asarray((self.nodes.plane[half >> 1] - (half & 1)) % self.planes.counts[self.nodes.row[half >> 1]])
 
     def open(self) -> Int:
         """Halves that are joined to none, of nodes on planes."""
@@ -124,8 +123,7 @@ class _Curves:
 
     def trace(self) -> None:
         """Open halves, step by step to where they leave their slab."""
-        half = self.open()
-        half = half[~self.traced[half]]
+        half = np.setdiff1d(self.open(), np.flatnonzero(self.traced))
         self.traced[half] = True
         passed, end = self._follow_rays(half)
         arrived, every = np.flatnonzero(end.plane >= 0), np.arange(len(half))
@@ -164,18 +162,23 @@ class _Curves:
         row, slab = self.nodes.row[half >> 1], self.slab(half)
         low, high = (self.planes.values[row, plane % self.planes.counts[row]] for plane in (slab, slab + 1))
         half_width, step = 0.5 * np.remainder(high - low, 2 * np.pi), np.full(len(half), MAX_STEP)
-        return _Rays(np.arange(len(half)), row, slab, low + half_width, half_width, step, self.nodes.leaving(half))
+        points = self.nodes.leaving(half)
+        points = onto_curves(self.follower, row, points.q, points.tangent)  # as near as short steps need
+        return _Rays(np.arange(len(half)), row, slab, low + half_width, half_width, step, points)
 
     def _follow_rays(self, half: Int) -> tuple[_Rays, Nodes]:
         """Halves (M,) step by step through their slabs: as rays at all points that they pass on the way, and the nodes
         that they come to (M,), on plane -1 where a ray is lost."""
-        rays, passed = self._rays(half), []
+        arm, origin, rays, passed = self.follower.arm, self.nodes.points.q[half >> 1], self._rays(half), []
         end = Nodes(rays.row, np.full(len(half), -1), rows_of(rays.points, rays.number))
         for _ in range(TRIES):
             points, valid = self._advance(rays)
             leaves = valid & self._leave_slab(rays, points)
             crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
-            replace_rows(end, rays.number[leaves], crossing)
+            way = newton.wrapped_distance(arm, crossing.points.q, origin[rays.number[leaves]])
+            valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
+            leaves &= valid
+            replace_rows(end, rays.number[leaves], rows_of(crossing, found))
             continues = valid & ~leaves
             replace_rows(rays.points, continues, rows_of(points, continues))
             passed.append(rows_of(rays, continues))
@@ -189,10 +192,10 @@ class _Curves:
         """The points to which a step along the tangents leads rays (R,), and whether along their curves."""
         follower, begin, step = self.follower, rays.points, rays.step[:, None]
         predicted = begin.q + step * begin.tangent * radian_or_reach(follower.arm)
-        points = onto_curves(follower, rays.row, predicted, begin.tangent, tol.SAME_SEED)
+        points = onto_curves(follower, rays.row, predicted, begin.tangent)
         arcs = Ways.between(follower, begin, points)
         drift = np.sqrt(((arcs.chord - step * begin.tangent) ** 2).sum(axis=1))
-        is_close = (points.step < tol.SAME_SEED) & (drift < SIDE_SHARE * rays.step)
+        is_close = points.settled & (drift < SIDE_SHARE * rays.step)
         return points, is_close & arcs.follow(follower, rays.row)
 
     def _leave_slab(self, rays: _Rays, points: Points) -> Bool:
@@ -255,9 +258,9 @@ def _join_curves(follower: Follower, owner: Int, q: Array) -> Chains:
     """Curves of all targets that an answer on a plane, or one of q (M, n) of targets owner (M,), is on."""
     curves = _Curves(follower, owner, q)
     for _ in range(ROUNDS):
+        curves.join_pairs()
         if curves.traced[curves.open()].all():
             break
-        curves.join_pairs()
         curves.trace()
     return _chain_halves(curves)
 

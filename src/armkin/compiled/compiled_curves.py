@@ -1,0 +1,96 @@
+"""Families of a seven-joint arm that are traced, by machine code; targets that it leaves are traced by numpy."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from armkin.compiled import curves_source, toolchain
+from armkin.formula.array_tuples import rows_of
+from armkin.formula.arrays import Array, Int
+from armkin.inverse.redundant.curve_starts import VALUES
+from armkin.inverse.redundant.families import Curves, CurvesOf
+from armkin.inverse.redundant.interval_pieces import Known, Pieces
+from armkin.inverse.redundant.traced_families import trace_families
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, arm_without, nearly_closed
+
+if TYPE_CHECKING:
+    from armkin.inverse.redundant.other_joints import Follower
+    from armkin.model.arm import Arm
+
+AT_ONCE = 250  # targets that one call of C answers
+ROOM = 48  # pieces of a target for which there is room, on average: 32 at most of 1,000 random ones
+
+HeldAnswers = Callable[["Arm", Array], Array]  # all answers (N, B, 6) of targets, nan for none, of an arm of six joints
+
+
+@lru_cache(maxsize=16)
+def compiled_curves(arm: Arm, redundant: Redundancy) -> CompiledCurves | None:
+    """The curves of an arm in machine code; None if its families are not traced with another joint's guide."""
+    if redundant.about_tool_axis or redundant.by_formula or arm.prismatic.any() or arm.keep_out:
+        return None
+    guide = nearly_closed(arm, redundant)
+    return None if guide is redundant or (arm.ratio != 1.0).any() else CompiledCurves(arm, redundant, guide)
+
+
+class CompiledCurves:
+    """The library of an arm whose families are traced with a guide that is not the redundant joint."""
+
+    def __init__(self, arm: Arm, redundant: Redundancy, guide: Redundancy) -> None:
+        code = toolchain.load_library(*curves_source.library(arm, redundant, guide), curves_source.LEVEL)
+        pointer, size = ctypes.c_void_p, ctypes.c_int64
+        self._call = code.arm_families
+        self._call.argtypes, self._call.restype = [size, *[pointer] * 3, size, size, *[pointer] * 7], None
+        code.arm_work_bytes.restype = size
+        self._work_bytes = code.arm_work_bytes()
+        joint = curves_source.other_joint(guide)
+        self._held = [arm_without(arm, ((arm.joint_names[joint], value),)) for value in VALUES]
+
+    def of(self, held_answers: HeldAnswers) -> CurvesOf:
+        """`families.curves_in_numpy` by machine code; held_answers: solves for the others with one joint held."""
+
+        def curves_of(follower: Follower) -> Iterator[Curves]:
+            memory = np.empty(self._work_bytes, np.uint8)
+            for begin in range(0, len(follower.target), AT_ONCE):
+                yield from self._curves(follower.of(slice(begin, begin + AT_ONCE)), held_answers, memory)
+
+        return curves_of
+
+    def _curves(self, follower: Follower, held_answers: HeldAnswers, memory: Any) -> Iterator[Curves]:
+        pieces, nearest, counts, small = self._solve(follower, held_answers, memory)
+        ends = np.append(0, np.cumsum(np.maximum(counts, 0)))
+        # stretches of targets that were solved, and that are left
+        bounds = np.flatnonzero(np.diff(counts < 0, prepend=counts[:1] >= 0)).tolist()
+        for a, b in zip(bounds, [*bounds[1:], len(counts)], strict=True):
+            if counts[a] < 0:
+                yield from trace_families(follower.of(slice(a, b)))
+                continue
+            part = slice(ends[a], ends[b])
+            own = rows_of(pieces, part)
+            yield Known(own._replace(row=own.row - a), small[a:b], np.zeros(b - a, bool), nearest[part])
+
+    def _solve(self, follower: Follower, held_answers: HeldAnswers, memory: Any) -> tuple[Pieces, Array, Int, Any]:
+        """Pieces of targets N with their nearest postures, how many of each (N,), -1 of those left to numpy, and on
+        which (N,) no joint moves far along any curve."""
+        N, n = follower.near.shape
+        target, near = np.ascontiguousarray(follower.target), np.ascontiguousarray(follower.near)
+        answers = [held_answers(arm, target) for arm in self._held]
+        width = max(rows.shape[1] for rows in answers)
+        held = np.full((len(answers), N, width, n - 1), np.nan)
+        for k, rows in enumerate(answers):
+            held[k, :, : rows.shape[1]] = rows
+        room = ROOM * N
+        curve, legal, small = np.empty(room, np.int64), np.empty(room, bool), np.empty(N, bool)
+        ends, nearest, counts = np.empty((room, 2)), np.empty((room, n)), np.empty(N, np.int64)
+        outputs = (curve, legal, ends, nearest, counts, small, memory)
+        inputs = (target, near, held)
+        self._call(N, *(x.ctypes.data for x in inputs), width, room, *(x.ctypes.data for x in outputs))
+        total = int(np.maximum(counts, 0).sum())
+        a, b = ends[:total].T
+        row, zero = np.repeat(np.arange(N), np.maximum(counts, 0)), np.zeros(total)
+        pieces = Pieces(row, curve[:total], legal[:total], a, b, a, b, zero, zero, zero, nearest[:total])
+        return pieces, nearest[:total], cast(Int, counts), small
