@@ -20,7 +20,6 @@ import armkin
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 from redundant_arms import covers_value, held_answers, redundant_postures
 
-from armkin.compiled.families_source import followed_redundancy
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
 
 Ik = Callable[[np.ndarray], armkin.Solutions]
@@ -32,12 +31,11 @@ END = 1e-8  # [rad]
 
 def main() -> None:
     count, brute = (int(word) for word in (sys.argv[1:] + ["10000", "20"][len(sys.argv) - 1 :]))
-    print("arm             targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
+    print("arm                  targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
     for name in ARMS:
         arm = armkin.load(name)
         print(family_row(name, arm, lambda target, arm=arm: armkin.ik(arm, target), count, brute), flush=True)
-        if followed_redundancy(arm, None) is not None:
-            print(family_row(f"{name} compiled", arm, armkin.compile(arm).ik, count, brute), flush=True)
+        print(family_row(f"{name} compiled", arm, armkin.compile(arm).ik, count, brute), flush=True)
 
 
 def family_row(name: str, arm: armkin.Arm, ik: Ik, count: int, brute: int) -> str:
@@ -65,7 +63,7 @@ def family_row(name: str, arm: armkin.Arm, ik: Ik, count: int, brute: int) -> st
         alone.append(time.process_time() - start)
     places, wrong_counts = by_brute_force(arm, ik, redundant.joint, target[:brute])
     return (
-        f"{name:15s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
+        f"{name:20s} {count:7d} {1e3 * spent / count:8.2f} {1e3 * float(np.median(alone)):10.1f} {rows / count:10.2f}"
         f" {lost:5d} {missed:7d} {places:13d} {wrong_counts:9d}"
     )
 
