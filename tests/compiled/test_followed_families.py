@@ -19,6 +19,7 @@ from armkin.inverse.redundant.interval_pieces import motion
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
 from redundant_arms import covers_value, held_answers, redundant_postures
+from test_turn_roots import class_arm
 
 JOINT = 6  # the redundant one
 SANITIZERS = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -145,6 +146,18 @@ def test_where_rounding_decides_python_is_asked() -> None:
     python, compiled = armkin.ik(arm, target), armkin.compile(arm).ik(target)
     assert not (python.complete & ~compiled.complete).any()
     assert 15 <= (~compiled.complete).sum() <= (~python.complete).sum()
+
+
+def test_arms_of_the_kind_have_their_families_whatever_their_axes() -> None:
+    """Axes 1 to 3 meet, and axes 5 and 6; one joint has no limits, one turns by more than a turn."""
+    rng = np.random.default_rng(3)
+    limits = np.sort(rng.uniform(-3.1, 3.1, (7, 2)), axis=1) + np.array([-1.0, 1.0])
+    limits[0], limits[2] = (-np.inf, np.inf), (-4.5, 4.5)
+    arm = class_arm(rng, limits)
+    target = armkin.fk(arm, rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (60, 7)))
+    near = rng.uniform(-4, 4, (60, 7))
+    python, compiled = armkin.ik(arm, target, near=near), armkin.compile(arm).ik(target, near=near)
+    assert assert_same_families(arm, python, compiled, near) >= 54
 
 
 def test_a_posture_that_stands_on_its_target_stays() -> None:

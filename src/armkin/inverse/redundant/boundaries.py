@@ -8,7 +8,6 @@ The product of such an equation over the signs of s and g, over the squares that
 trigonometric polynomial in t of degree 8 at most, whatever branches are real. Between its roots nothing changes.
 """
 
-import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -91,9 +90,8 @@ def _in_line(L: Array, upper: Array, fore: Array) -> Array | None:
     axis3, axis5 = L[3][:3, :3].T @ Z, L[4][:3, 2]
     way = _apart(axis3, axis5)
     for cos, sin in way / np.hypot(*way), -way / np.hypot(*way):
-        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], Z])
-        line = upper - turn.T @ fore
-        if max(np.abs(np.cross(turn @ v, axis5)).max() for v in (axis3, line)) <= tol.EXACT:
+        turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], Z])  # rotation about z by -q4
+        if max(np.abs(np.cross(v, axis5)).max() for v in (turn @ axis3, turn @ upper - fore)) <= tol.EXACT:
             return np.array([cos, sin])
     return None
 
@@ -106,18 +104,11 @@ class _WristFrame:
         self.u = self.seen_behind6(shoulder) + (bounds.link[6][:3, 3] - bounds.wrist)[:, None, None]  # to the shoulder
         self.u_square = (self.u * self.u).sum(axis=0)
         # the wrist's squared distance is offset - 2 swing cos(q4 - middle)
-        upper, fore = bounds.upper, bounds.fore
-        cos_part, sin_part = _apart(upper, fore)
-        swing = np.sqrt(cos_part * cos_part + sin_part * sin_part)
-        self.middle = cos_part / swing, sin_part / swing
-        offset = upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2]
+        upper, fore, way = bounds.upper, bounds.fore, _apart(bounds.upper, bounds.fore)
+        offset, swing = upper @ upper + fore @ fore - 2.0 * upper[2] * fore[2], np.sqrt(way @ way)
+        self.middle = way / swing  # its cosine and sine
         self.cos = (offset - self.u_square) / (2.0 * swing)  # cosine of joint 4, from its middle
         self.square = 1.0 - self.cos * self.cos  # square of its sine, s
-
-    def from_middle(self, cos: float, sin: float) -> float:
-        """The cosine of joint 4 from its middle, by its cosine and sine."""
-        cosine: float = self.middle[0] * cos + self.middle[1] * sin
-        return cosine
 
     def seen_behind6(self, v: Array) -> Complex:
         """Vectors (S, 3) seen behind joint 7, as seen behind joint 6 (3, S, M)."""
@@ -164,7 +155,7 @@ def _shoulder(frame: _WristFrame, e0: Array, e3: Array, cosine: float) -> Comple
     product = A * A - g_square * (B * B)
     value = product.product() / (p_square * p_square * cross_square.product())  # over the signs of s
     if bounds.in_line is not None and np.array_equal(e3, Z):  # twice a root there, of branches that are not real
-        value = value / (frame.cos - frame.from_middle(*bounds.in_line.tolist())) ** 2
+        value = value / (frame.cos - frame.middle @ bounds.in_line) ** 2
     return np.asarray(value)
 
 
@@ -186,12 +177,14 @@ def equations(bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) 
     R, limits = bounds.link[:, :3, :3], [_limits_of_joint(bounds.arm, j) for j in range(6)]
     axis1, axis5 = R[0] @ Z, R[5].T @ Z
     u, h = frame.before5(bounds.upper, bounds.fore), frame.u[2]
-    values = [_shoulder(frame, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
+    middle, way = R[1][2, 2] * R[2][2, 2], float(np.hypot(*R[1][2, :2]) * np.hypot(*R[2][:2, 2]))
+    # branches of a shoulder merge where axes 1 and 3 are as near to each other, or as far, as axis 2 lets them
+    apart = [cosine for cosine in (middle - way, middle + way) if abs(cosine) < 1.0 - tol.EXACT]
+    values = [_shoulder(frame, axis1, Z, cosine) for cosine in apart]
+    values += [_shoulder(frame, R[0] @ rotation_about(2, q) @ R[1] @ Z, Z, float(R[2][2, 2])) for q in limits[0]]
     values += [_shoulder(frame, axis1, Z, float((R[1] @ rotation_about(2, q) @ R[2])[2, 2])) for q in limits[1]]
     values += [_shoulder(frame, axis1, rotation_about(2, -q) @ R[2].T @ Z, float(R[1][2, 2])) for q in limits[2]]
-    values += [
-        frame.cos - cos for cos in (1.0, -1.0, *(frame.from_middle(math.cos(q), math.sin(q)) for q in limits[3]))
-    ]
+    values += [frame.cos - cos for cos in (1.0, -1.0, *(frame.middle @ [np.cos(q), np.sin(q)] for q in limits[3]))]
     for q in limits[4]:  # axis 6 and the line to the shoulder
         x, y, z = rotation_about(2, q) @ R[5] @ Z
         values.append((u[0] * x + u[1] * y + u[2] * z - h).product())
