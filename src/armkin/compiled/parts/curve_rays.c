@@ -167,16 +167,20 @@ static int arm_node_on_plane(arm_curves *f, const arm_ray *ray, int before)
     return arm_add_node(f, ray->q, ray->tangent, ray->end);
 }
 
-/* Whether the arc of ray i is kept: it is traced from both of its ends, and may come to where another one came. */
+/* Whether the arc of ray i is kept: it is traced from both of its ends, and may come to where another one came, or whose own
+   arc leads elsewhere. */
 static int arm_keeps_ray(const arm_curves *f, const arm_tracing *work, int i, int count)
 {
-    const int goal = work->goal[i];
+    const int goal = work->goal[i], half = work->ray[i].half;
     int k;
-    if (goal < 0 || f->partner[goal] >= 0 || goal == work->ray[i].half)
+    if (goal < 0 || f->partner[goal] >= 0 || goal == half)
         return 0;
-    for (k = 0; k < count; k++)
-        if ((work->ray[k].half == goal && k <= i) || (work->goal[k] == goal && k < i))
+    for (k = 0; k < count; k++) {
+        if (work->goal[k] == goal && k < i)
             return 0;
+        if (work->ray[k].half == goal && (k <= i || (work->goal[k] >= 0 && work->goal[k] != half)))
+            return 0;
+    }
     return 1;
 }
 

@@ -133,6 +133,8 @@ class _Curves:
         # an arc is traced from both of its ends: one of the two traces is kept
         selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place[goal]) & (goal != half)
         selected &= np.isin(every, np.unique(goal, return_index=True)[1])
+        back = np.append(goal, -1)[place[goal]]  # to where the half leads that it comes to: of two ways one is wrong
+        selected &= (back < 0) | (back == half)
         rays, passed = np.flatnonzero(selected), rows_of(passed, selected[passed.number])
         added = self._add(Nodes(passed.row, np.full(len(passed.row), -1), passed.points))
         a = np.append(half[rays], 2 * added)[np.argsort(np.append(rays, passed.number), kind="stable")]
