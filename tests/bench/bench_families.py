@@ -11,6 +11,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -34,7 +35,7 @@ def main() -> None:
     print("arm                  targets  ms each  alone, ms  intervals  lost  missed  places asked  ends off")
     for name in ARMS:
         arm = armkin.load(name)
-        print(family_row(name, arm, lambda target, arm=arm: armkin.ik(arm, target), count, brute), flush=True)
+        print(family_row(name, arm, partial(armkin.ik, arm), count, brute), flush=True)
         print(family_row(f"{name} compiled", arm, armkin.compile(arm).ik, count, brute), flush=True)
 
 

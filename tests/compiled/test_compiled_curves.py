@@ -12,6 +12,7 @@ import armkin
 from armkin.compiled import compiled_arm, compiled_curves
 from armkin.inverse import solve
 from armkin.inverse.redundant.families import families
+from armkin.inverse.redundant.traced_families import trace_families
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
 
 # Motion [deg] by which a posture may be further than numpy's: where the redundant joint turns back, rounding leaves its
@@ -30,7 +31,7 @@ def reversed_gen3() -> armkin.Arm:
     arm = gen3()
     lower, upper = -arm.upper[::-1], -arm.lower[::-1]
     lower[2], upper[2], lower[4], upper[4] = np.deg2rad([-100, 400, -180, 180])
-    link = tuple(np.linalg.inv(T) for T in arm.link[::-1])
+    link = np.stack([np.linalg.inv(T) for T in arm.link[::-1]])
     return replace(arm, name="reversed", link=link, lower=lower, upper=upper, home=-arm.home[::-1])
 
 
@@ -85,11 +86,10 @@ def assert_as_by_numpy(
 def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """How many targets are left to numpy, call by call."""
     counts: list[int] = []
-    trace = compiled_curves.trace_families
 
     def count_and_trace(follower):  # type: ignore[no-untyped-def]
         counts.append(len(follower.target))
-        return trace(follower)
+        return trace_families(follower)
 
     monkeypatch.setattr(compiled_curves, "trace_families", count_and_trace)
     return counts

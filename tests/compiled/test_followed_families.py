@@ -18,8 +18,7 @@ from armkin.inverse.redundant.boundaries import boundaries, from_joint7
 from armkin.inverse.redundant.interval_pieces import motion
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
-from redundant_arms import covers_value, held_answers, redundant_postures
-from test_turn_roots import class_arm
+from redundant_arms import arm_with_shoulder_and_wrist, covers_value, held_answers, redundant_postures
 
 JOINT = 6  # the redundant one
 SANITIZERS = ["-O1", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
@@ -153,7 +152,7 @@ def test_arms_of_the_kind_have_their_families_whatever_their_axes() -> None:
     rng = np.random.default_rng(3)
     limits = np.sort(rng.uniform(-3.1, 3.1, (7, 2)), axis=1) + np.array([-1.0, 1.0])
     limits[0], limits[2] = (-np.inf, np.inf), (-4.5, 4.5)
-    arm = class_arm(rng, limits)
+    arm = arm_with_shoulder_and_wrist(rng, limits)
     target = armkin.fk(arm, rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (60, 7)))
     near = rng.uniform(-4, 4, (60, 7))
     python, compiled = armkin.ik(arm, target, near=near), armkin.compile(arm).ik(target, near=near)

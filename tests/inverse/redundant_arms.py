@@ -5,6 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 import armkin
+from armkin.model.arm import from_links
+
+
+def arm_with_shoulder_and_wrist(rng: np.random.Generator, limits: np.ndarray) -> armkin.Arm:
+    """Seven axes anywhere, but for a shoulder and a wrist."""
+    links = np.tile(np.eye(4), (8, 1, 1))
+    for k in range(8):
+        Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        links[k, :3, :3] = Q * np.linalg.det(Q)
+        if k not in (1, 2, 5):
+            links[k, :3, 3] = 200 * rng.normal(size=3)
+    return from_links(links, [False] * 7, limits=limits)
 
 
 def redundant_postures(arm: armkin.Arm, task: str | None, count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:

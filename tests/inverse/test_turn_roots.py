@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+from redundant_arms import arm_with_shoulder_and_wrist
 
 import armkin
 from armkin.inverse.redundant.boundaries import boundaries, boundary_angles
 from armkin.inverse.redundant.turn_roots import roots, sampled_at
-from armkin.model.arm import Arm, from_links
+from armkin.model.arm import from_links
 
 DEGREE = 8
 
@@ -40,17 +41,6 @@ def test_two_roots_are_told_from_none_and_one_double_one_is_undecided(
     assert count is None or len(listed.at) == count
 
 
-def class_arm(rng: np.random.Generator, limits: np.ndarray) -> Arm:
-    """Seven axes anywhere, but for a shoulder and a wrist."""
-    links = np.tile(np.eye(4), (8, 1, 1))
-    for k in range(8):
-        Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        links[k, :3, :3] = Q * np.linalg.det(Q)
-        if k not in (1, 2, 5):
-            links[k, :3, 3] = 200 * rng.normal(size=3)
-    return from_links(links, [False] * 7, limits=limits)
-
-
 def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
     """Whatever branches are real: of random arms of the class, each limit of each joint in turn."""
     for seed in range(3):
@@ -60,7 +50,7 @@ def test_where_a_joint_stands_on_a_limit_there_is_a_place() -> None:
             for side in range(2):
                 limits = np.tile([-2.9, 2.9], (7, 1))
                 limits[joint, side] = q[joint]
-                arm = class_arm(np.random.default_rng(100 + seed), limits)
+                arm = arm_with_shoulder_and_wrist(np.random.default_rng(100 + seed), limits)
                 of = boundaries(arm)
                 assert of is not None
                 [values], _ = boundary_angles(of, armkin.fk(arm, q)[None])
@@ -72,7 +62,7 @@ def test_where_branches_of_a_twisted_shoulder_merge_there_is_a_place() -> None:
     for seed in (0, 3):
         rng = np.random.default_rng(seed)
         limits = np.sort(rng.uniform(-3.1, 3.1, (7, 2)), axis=1) + np.array([-1.0, 1.0])
-        arm = class_arm(rng, limits)
+        arm = arm_with_shoulder_and_wrist(rng, limits)
         q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (40, 7))
         assert armkin.ik(arm, armkin.fk(arm, q)).complete.mean() > 0.9
 

@@ -171,7 +171,8 @@ class _Curves:
     def _follow_rays(self, half: Int) -> tuple[_Rays, Nodes]:
         """Halves (M,) step by step through their slabs: as rays at all points that they pass on the way, and the nodes
         that they come to (M,), on plane -1 where a ray is lost."""
-        arm, origin, rays, passed = self.follower.arm, self.nodes.points.q[half >> 1], self._rays(half), []
+        arm, origin, passed = self.follower.arm, self.nodes.points.q[half >> 1], []
+        rays = self._rays(half)
         end = Nodes(rays.row, np.full(len(half), -1), rows_of(rays.points, rays.number))
         for _ in range(TRIES):
             points, valid = self._advance(rays)
