@@ -171,14 +171,13 @@ class _Curves:
     def _follow_rays(self, half: Int) -> tuple[_Rays, Nodes]:
         """Halves (M,) step by step through their slabs: as rays at all points that they pass on the way, and the nodes
         that they come to (M,), on plane -1 where a ray is lost."""
-        arm, origin, passed = self.follower.arm, self.nodes.points.q[half >> 1], []
-        rays = self._rays(half)
+        origin, rays, passed = self.nodes.points.q[half >> 1], self._rays(half), []
         end = Nodes(rays.row, np.full(len(half), -1), rows_of(rays.points, rays.number))
         for _ in range(TRIES):
             points, valid = self._advance(rays)
             leaves = valid & self._leave_slab(rays, points)
             crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
-            way = newton.wrapped_distance(arm, crossing.points.q, origin[rays.number[leaves]])
+            way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin[rays.number[leaves]])
             valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
             leaves &= valid
             replace_rows(end, rays.number[leaves], rows_of(crossing, found))
