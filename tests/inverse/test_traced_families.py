@@ -100,3 +100,12 @@ def test_answers_do_not_depend_on_the_joint_whose_values_are_asked(monkeypatch: 
         assert len(legal)
         away = np.abs(np.remainder(legal[:, None] - same + np.pi, 2 * np.pi) - np.pi).max(axis=2)
         assert away.min(axis=1).max() < 1e-9
+
+
+def test_where_a_joint_turns_back_at_the_end_of_a_curve_the_next_target_keeps_its_own_postures() -> None:
+    """The second one listed two that are off by half a metre, of the first one's curve."""
+    arm = armkin.load("kinova_gen3")
+    _, target = redundant_postures(arm, None, 9708, 22)
+    mm, rad = armkin.ik(arm, target[-2:]).residual()
+    assert np.nanmax(mm) <= 1e-6
+    assert np.nanmax(rad) <= 1e-9

@@ -122,8 +122,9 @@ class Traced(NamedTuple):
         posture = np.concatenate([q, cross_q, turn_q])
         order = np.lexsort((share, cell))
         cell, share = cell[order], share[order]
+        point = point[cell]
         return _Nodes(
-            point[cell] + share, posture[order],
+            np.minimum(point + share, np.nextafter(point + 1.0, 0.0)), posture[order],  # at the end still of its curve
             np.where(cross_share[cell] <= share, next_legal[cell], legal[cell]) & alive[cell],
             np.where(turn_share[cell] <= share, next_rises[cell], rises[cell]), alive[cell],
         )  # fmt: skip
