@@ -128,6 +128,13 @@ def tip_and_jacobian(arm: Arm, q: ArrayLike) -> tuple[Poses, Jacobians]:
     return entries[..., :16].reshape(*batch_shape, 4, 4), entries[..., 16:].reshape(*batch_shape, 6, arm.n)
 
 
+def tip_and_jacobian_columns(arm: Arm, q: Array) -> Array:
+    """The entries of `tip_and_jacobian`, row by row, of many poses q (N, n) in columns: (16 + 6 n, N)."""
+    columns = np.empty((16 + 6 * arm.n, len(q)))
+    _fill(columns.T, arm, q, pose_and_jacobian)
+    return columns
+
+
 def manipulability(arm: Arm, q: ArrayLike, rows: slice | list[int] | None = None) -> Figures:
     """Yoshikawa's measure ``sqrt(det(J J^T))``, computed as the product of J's singular values.
 
@@ -340,12 +347,16 @@ def _joint_motions(arm: Arm, turns: Iterable[Entry]) -> list[Motion]:
 def _run_batched(arm: Arm, values: Array, shape: tuple[int, ...], formula: Formula) -> Array:
     """A formula's entries for every pose: values (..., n) -> (..., *shape)."""
     results = np.empty(values.shape[:-1] + shape)
-    q, rows = values.reshape(-1, arm.n), results.reshape(-1, math.prod(shape))
+    _fill(results.reshape(-1, math.prod(shape)), arm, values.reshape(-1, arm.n), formula)
+    return results
+
+
+def _fill(rows: Array, arm: Arm, q: Array, formula: Formula) -> None:
+    """Write the entries of poses q (N, n) into rows (N, entries)."""
     if len(q) > SMALL_BATCH:
         _fill_by_chunks(rows, q, _recorded_code(arm, formula).record_now())
     else:
         _fill_small_batch(rows, arm, q, formula)
-    return results
 
 
 def _fill_by_chunks(rows: Array, q: Array, code: StraightLineCode) -> None:

@@ -26,7 +26,7 @@ from armkin.inverse.solvers.choose_redundant_joint import redundancy
 Ik = Callable[[np.ndarray], armkin.Solutions]
 
 ARMS = ("panda", "iiwa7", "kinova_gen3")
-AT_ONCE = 250
+AT_ONCE = 1000  # targets in one call
 END = 1e-8  # [rad]
 
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Array, Bool, Int, slices
+from armkin.formula.linear_systems import eliminate
+from armkin.forward import tip_and_jacobian_columns
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.numeric.newton import nudged
@@ -17,7 +19,9 @@ from armkin.model.units import radian_or_reach
 
 MAX_STEP = 0.3  # length [rad, reaches], at most, of one step of Newton's method
 NEWTON = 4  # steps of Newton's method onto the curve
-AT_ONCE = 1000  # postures that Newton's method works on at once: they stay in the cache
+WEAK_PIVOT = 1e-6  # pivot [1] up to which an elimination may lose more than six digits
+FEW_POSTURES = 100  # postures of which no elimination in common is faster
+AT_ONCE = 3000  # postures that Newton's method works on at once: they stay in the cache
 
 
 class Points(NamedTuple):
@@ -44,27 +48,65 @@ def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: 
 
 def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float) -> Points:
     """Move at most `AT_ONCE` postures q (M, n) [rad | mm], which the cache holds, onto curves as `onto_curves` does."""
-    arm, task, unit = follower.arm, follower.redundant.task, radian_or_reach(follower.arm)
-    target = follower.target[row]
+    unit, target = radian_or_reach(follower.arm), follower.target[row]
     q, tangent = q.copy(), last.copy()
     size, active = np.full(len(q), np.inf), np.arange(len(q))
     for _ in range(NEWTON):
         if not len(active):
             break
         part = slice(None) if len(active) == len(q) else active
-        residual, J = newton.scaled_residual_and_jacobian(arm, task, q[part], target[part])
-        rows = np.concatenate([J, last[part, None]], axis=1)
-        right = np.zeros((*rows.shape[:2], 2))
-        right[:, :-1, 0], right[:, -1, 1] = residual, 1.0
-        # the direction of a tool's axis is three numbers for two constraints
-        x = nudged(np.linalg.solve, rows, right) if rows.shape[1] == arm.n else np.linalg.pinv(rows) @ right
-        step = x[:, :, 0]
-        tangent[part] = x[:, :, 1] / np.sqrt((x[:, :, 1] ** 2).sum(axis=1, keepdims=True))
-        longest = np.abs(step).max(axis=1)
-        q[part] += step * np.minimum(1.0, MAX_STEP / np.maximum(longest, MAX_STEP))[:, None] * unit
+        step, along = _steps(follower, q[part], target[part], last[part])
+        tangent[part] = (along / np.sqrt((along * along).sum(axis=0))).T
+        longest = np.abs(step).max(axis=0)
+        q[part] += (step * np.minimum(1.0, MAX_STEP / np.maximum(longest, MAX_STEP))).T * unit
         size[part] = np.where(np.isnan(longest), np.inf, longest)
         active = active[~(size[part] < tolerance)]  # the residual left is the square of the step
     return Points(q, tangent, size)
+
+
+def _equations(follower: Follower, q: Array, target: Array, last: Array) -> Array:
+    """Equations of Newton's steps across last (M, n) and of tangents: (rows, n + 2, M), their right sides last."""
+    arm, task, M = follower.arm, follower.redundant.task, len(q)
+    if task.orientation == "full":
+        columns = tip_and_jacobian_columns(arm, q)
+        T, J = columns[:12].reshape(3, 4, M), columns[16:].reshape(6, arm.n, M)
+        J *= radian_or_reach(arm)[:, None]
+        J[:3] /= arm.reach
+        goal = np.ascontiguousarray(target[:, :3].reshape(M, 12).T).reshape(3, 4, M)
+        products = (T[:, None, :3] * goal[:, :3]).sum(axis=2)
+        # half the sum of the columns' vector products is the rotation vector to third order
+        sines = 0.5 * np.stack([products[k, i] - products[i, k] for i, k in ((2, 1), (0, 2), (1, 0))])
+        sines[:, products[0, 0] + products[1, 1] + products[2, 2] < 1.0] = np.nan  # more than a quarter of a turn
+        residual = np.concatenate([(goal[:, 3] - T[:, 3]) / arm.reach, sines])
+    else:
+        r, slopes = newton.scaled_residual_and_jacobian(arm, task, q, target)
+        residual, J = r.T, slopes.transpose(1, 2, 0)
+    equations = np.zeros((len(J) + 1, arm.n + 2, M))
+    equations[:-1, :-2], equations[:-1, -2] = J, residual
+    equations[-1, :-2], equations[-1, -1] = last.T, 1.0
+    return equations
+
+
+def _steps(follower: Follower, q: Array, target: Array, last: Array) -> Array:
+    """Newton's steps and tangents (2, n, M): by the same elimination for all, one after the other where one of its
+    pivots is weak or where they are few."""
+    equations, n = _equations(follower, q, target, last), follower.arm.n
+    if len(q) < FEW_POSTURES or len(equations) != n:
+        return _one_by_one(equations)
+    rows = np.flatnonzero(eliminate(equations, WEAK_PIVOT))
+    x = equations[:, n:].swapaxes(0, 1)
+    if len(rows):
+        x[:, :, rows] = _one_by_one(_equations(follower, q[rows], target[rows], last[rows]))
+    return x
+
+
+def _one_by_one(equations: Array) -> Array:
+    """Solutions (2, n, M) of equations (rows, n + 2, M)."""
+    matrices = equations.transpose(2, 0, 1)
+    left, right = matrices[:, :, :-2], matrices[:, :, -2:]
+    # the direction of a tool's axis is three numbers for two constraints
+    x = nudged(np.linalg.solve, left, right) if left.shape[1] == left.shape[2] else np.linalg.pinv(left) @ right
+    return x.transpose(2, 1, 0)
 
 
 class Ways(NamedTuple):

@@ -16,12 +16,13 @@ import numpy as np
 
 from armkin.formula.array_tuples import rows_of
 from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
+from armkin.inverse.closed.candidates import recorded_formula
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
 from armkin.inverse.redundant.interval_pieces import may_turn_back
 from armkin.inverse.redundant.other_joints import Follower, over_a_turn
-from armkin.inverse.solvers.choose_redundant_joint import Redundancy, arm_without, nearly_closed
+from armkin.inverse.solvers.choose_redundant_joint import Redundancy, arm_without, near_classes, nearly_closed
 
 PLANES = 60  # values of the joint at which the target is solved
 WAY_PARTS = 12  # parts of the way between two planes, where answers may be that neither plane has
@@ -73,8 +74,9 @@ class Planes(NamedTuple):
 def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[Planes, Nodes, Int]:
     """The planes of all targets, the answers on them, and the answer's number at each plane and branch (N, V, B).
 
-    The number is -1 where there is no answer. postures: (M, n) further answers of targets owner (M,), for each of which
-    a plane is added; they are left out where the joint of the planes is the redundant one.
+    The last branch is none: answers between the others. The number is -1 where there is no answer. postures: (M, n)
+    further answers of targets owner (M,), for each of which a plane is added; they are left out where the joint of the
+    planes is the redundant one.
     """
     guide, N = nearly_closed(follower.arm, follower.redundant), len(follower.target)
     row, t, q, solving, extra = _starts_on_planes(follower, guide, owner, postures)
@@ -90,7 +92,7 @@ def answers_on_planes(follower: Follower, owner: Int, postures: Array) -> tuple[
     nodes, index = planes.answers(row[sample], plane[sample], start)
     grid = np.full((*planes.values.shape, q.shape[1] + 1), -1)
     grid[nodes.row, nodes.plane, branch[index]] = np.arange(len(index))
-    return planes, nodes, grid[:, :, :-1]
+    return planes, nodes, grid
 
 
 def _starts_on_planes(
@@ -159,26 +161,41 @@ def answers_off_curves(follower: Follower, points: Points, row: Int, after: Int)
 
 
 def _off_curves_at(follower: Follower, j: int, value: float, points: Points, row: Int, after: Int) -> tuple[Int, Array]:
-    """Targets (M,) and their answers (M, n) [rad | mm] that lie on no curve, with joint j held at a value [rad]."""
+    """Targets (M,) and their answers (M, n) [rad | mm] that lie on no curve, with joint j held at a value [rad].
+
+    Not solved are targets of which each candidate of a class that the arm misses by little has a crossing of its own.
+    """
+    task, rows = follower.redundant.task, np.arange(len(follower.target))
     held_arm = arm_without(follower.arm, ((follower.arm.joint_names[j], value),))
-    s = follower.ik(held_arm, follower.target, follower.redundant.task.name, examine=False)
-    target, branch = np.nonzero(s.valid)
-    q = np.insert(s.q[target, branch], j, value, axis=1)
-    crossing, owner = _crossings(follower, j, value, points, row, after)
-    order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(follower.target))
-    pair, k = np.nonzero(np.arange(int(count.max(initial=0))) < count[target, None])
-    index = order[(np.cumsum(count) - count)[target[pair]] + k]
-    on_curve = np.zeros(len(q), bool)
-    on_curve[pair[newton.wrapped_distance(follower.arm, q[pair], crossing[index]) < ON_CURVE]] = True
-    return target[~on_curve], q[~on_curve]
+    crossings = _crossings(follower, j, value, points, row, after)
+
+    def distances(q: Array, rows: Int | slice) -> Array:
+        """How far postures (M, B, n - 1), without joint j, are from the crossings of their targets: (M, B, K)."""
+        distance = newton.distances(follower.arm, np.insert(q, j, value, axis=2), crossings[rows])
+        return np.where(np.isnan(distance), np.inf, distance)
+
+    for ideal in near_classes(held_arm, task)[:1]:
+        q, squared_miss, _ = recorded_formula(held_arm, task, ideal).rows(follower.target)
+        # where branches are about to merge they miss by the root of a defect
+        distance, candidate = distances(q, rows), squared_miss < tol.NEAR_DEFECT
+        nearest = distance.argmin(axis=2)[:, :, None] == np.arange(distance.shape[2])
+        own = (nearest & (distance < ON_CURVE) & candidate[:, :, None]).any(axis=1)
+        rows = np.flatnonzero(own.sum(axis=1) < candidate.sum(axis=1))
+    s = follower.ik(held_arm, follower.target[rows], task.name, examine=False)
+    target, branch = np.nonzero(s.valid & ~(distances(s.q, rows) < ON_CURVE).any(axis=2))
+    return rows[target], np.insert(s.q[target, branch], j, value, axis=1)
 
 
-def _crossings(follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> tuple[Array, Int]:
-    """Postures (M, n) in which curves have the joint at a value, and of which targets they are (M,)."""
+def _crossings(follower: Follower, joint: int, value: float, points: Points, row: Int, after: Int) -> Array:
+    """Postures (N, K, n) in which curves of all targets have the joint at a value; nan where there are fewer."""
     gap, change = wrap_angle(points.q[:, joint] - value), wrap_angle(points.q[after, joint] - points.q[:, joint])
     begins = np.flatnonzero((gap * (gap + change) <= 0) & (change != 0))
     cubics = Ways.between(follower, rows_of(points, begins), rows_of(points, after[begins]))
     share = -gap[begins] / change[begins]
     for _ in range(SECANTS):
         share = np.clip(share - wrap_angle(cubics.at(follower, share)[:, joint] - value) / change[begins], 0.0, 1.0)
-    return cubics.at(follower, share), row[begins]
+    owner = row[begins]
+    order, count = np.argsort(owner, kind="stable"), np.bincount(owner, minlength=len(follower.target))
+    table = np.full((len(count), max(int(count.max(initial=0)), 1), follower.arm.n), np.nan)
+    table[owner[order], numbers_within(count)] = cubics.at(follower, share)[order]
+    return table

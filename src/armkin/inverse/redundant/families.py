@@ -38,7 +38,7 @@ from armkin.model.limits import outside_limits
 
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 256  # targets whose arm angles are worked on together
-TRACED = 250  # targets whose curves are traced together
+TRACED = 1000  # targets whose curves are traced together
 FREE_STEP = np.deg2rad(0.1)  # step [rad] of the parameter between postures that are asked whether they are free
 
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,

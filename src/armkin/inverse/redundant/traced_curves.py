@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from armkin.formula.array_tuples import replace_rows, rows_of, stack_rows
-from armkin.formula.arrays import Array, Bool, Int, numbers_within, wrap_angle
+from armkin.formula.arrays import Array, Bool, Int, numbers_within, slices, wrap_angle
 from armkin.inverse.numeric import newton
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant.curve_points import Points, Ways, onto_curves
@@ -20,6 +20,7 @@ from armkin.inverse.redundant.curve_starts import Nodes, answers_off_curves, ans
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.model.units import radian_or_reach
 
+AT_ONCE = 8000  # pairs of answers that are joined at once: they stay in the cache
 HALVINGS = 6  # halvings of the way between two answers
 ARC_LENGTH = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
 MAX_STEP = 0.3  # longest step [rad, reaches] along a curve
@@ -45,21 +46,31 @@ class _Curves:
 
     def __init__(self, follower: Follower, owner: Int, q: Array) -> None:
         self.follower = follower
-        self.planes, self.nodes, grid = answers_on_planes(follower, owner, q)
-        self.partner = np.full(2 * len(self.nodes.row), -1)  # the half that each is joined to, -1: none yet
+        self.planes, self.nodes, self.grid = answers_on_planes(follower, owner, q)
+        self.count = len(self.nodes.row)  # behind these there may be room for more
+        self.partner = np.full(2 * self.count, -1)  # the half that each is joined to, -1: none yet
         self.traced = np.zeros(len(self.partner), bool)  # a half whose ray was lost would lose it again
-        next_plane = (np.arange(grid.shape[1]) + 1) % self.planes.counts[:, None]
-        following = np.take_along_axis(grid, next_plane[:, :, None], axis=1)
-        adjacent = (grid >= 0) & (following >= 0)
-        self._join(2 * grid[adjacent], 2 * following[adjacent] + 1)
+        self.ends = np.arange(self.count)  # nodes on planes of which a half may be open
+        self.later = np.zeros(0, np.intp)  # nodes on planes, but not on the grid
+        next_plane = (np.arange(self.grid.shape[1]) + 1) % self.planes.counts[:, None]
+        following = np.take_along_axis(self.grid, next_plane[:, :, None], axis=1)
+        adjacent = (self.grid >= 0) & (following >= 0)
+        adjacent[:, :, -1] = False  # answers of no branch
+        a, b = 2 * self.grid[adjacent], 2 * following[adjacent] + 1
+        for part in slices(len(a), AT_ONCE):
+            self._join(a[part], b[part])
 
     def _add(self, nodes: Nodes) -> Int:
         """More nodes: their numbers."""
-        first = len(self.nodes.row)
-        self.nodes = stack_rows([self.nodes, nodes])
-        self.partner = np.append(self.partner, np.full(2 * len(nodes.row), -1))
-        self.traced = np.append(self.traced, np.zeros(2 * len(nodes.row), bool))
-        return np.arange(first, first + len(nodes.row))
+        number = np.arange(self.count, self.count + len(nodes.row))
+        self.count += len(nodes.row)
+        if self.count > len(self.nodes.row):
+            self.nodes = stack_rows([self.nodes, self.nodes, nodes])
+            added = 2 * len(self.nodes.row) - len(self.partner)
+            self.partner = np.append(self.partner, np.full(added, -1))
+            self.traced = np.append(self.traced, np.zeros(added, bool))
+        replace_rows(self.nodes, number, nodes)
+        return number
 
     def _join(self, a: Int, b: Int) -> None:
         """Halves a and b (M,) joined by cubics, of which each must do."""
@@ -100,7 +111,10 @@ class _Curves:
 
     def open(self) -> Int:
         """Halves that are joined to none, of nodes on planes."""
-        return np.flatnonzero((self.partner < 0) & (np.repeat(self.nodes.plane, 2) >= 0))
+        half = 2 * np.repeat(self.ends, 2) + np.tile([0, 1], len(self.ends))
+        half = half[self.partner[half] < 0]
+        self.ends = np.unique(half >> 1)
+        return np.asarray(half)
 
     def join_pairs(self) -> None:
         """Open halves of a slab, each with the one that a short cubic leads to, and which leads to it."""
@@ -123,17 +137,19 @@ class _Curves:
 
     def trace(self) -> None:
         """Open halves, step by step to where they leave their slab."""
-        half = np.setdiff1d(self.open(), np.flatnonzero(self.traced))
+        half = self.open()
+        half = half[~self.traced[half]]
         self.traced[half] = True
         passed, end = self._follow_rays(half)
         arrived, every = np.flatnonzero(end.plane >= 0), np.arange(len(half))
         node = self._on_plane(rows_of(end, arrived))
-        goal, place = np.full(len(half), -1), np.full(len(self.partner), len(half))
-        goal[arrived], place[half] = 2 * node + (end.plane != self.slab(half))[arrived], every
+        goal = np.full(len(half), -1)
+        goal[arrived] = 2 * node + (end.plane != self.slab(half))[arrived]
+        place = np.where(np.isin(goal, half), np.searchsorted(half, goal), len(half))
         # an arc is traced from both of its ends: one of the two traces is kept
-        selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place[goal]) & (goal != half)
+        selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place) & (goal != half)
         selected &= np.isin(every, np.unique(goal, return_index=True)[1])
-        back = np.append(goal, -1)[place[goal]]  # to where the half leads that it comes to: of two ways one is wrong
+        back = np.append(goal, -1)[place]  # to where the half leads that it comes to: of two ways one is wrong
         selected &= (back < 0) | (back == half)
         rays, passed = np.flatnonzero(selected), rows_of(passed, selected[passed.number])
         added = self._add(Nodes(passed.row, np.full(len(passed.row), -1), passed.points))
@@ -144,19 +160,20 @@ class _Curves:
     def _on_plane(self, arrived: Nodes) -> Int:
         """The nodes that others, on planes, are; those that are none yet become one."""
         places, number = self.planes.place(arrived.row, arrived.plane), np.full(len(arrived.row), -1)
+        on_grid = self.grid[arrived.row, arrived.plane]
         for _ in range(2):
-            on_plane = np.flatnonzero(self.nodes.plane >= 0)
-            place = self.planes.place(self.nodes.row[on_plane], self.nodes.plane[on_plane])
-            shared = np.isin(place, places)
-            i, k = np.nonzero(places[:, None] == place[shared])
-            k = on_plane[shared][k]
+            place = self.planes.place(self.nodes.row[self.later], self.nodes.plane[self.later])
+            beside = np.concatenate([on_grid, np.where(place == places[:, None], self.later, -1)], axis=1)
+            i, column = np.nonzero(beside >= 0)
+            k = beside[i, column]
             distance = newton.wrapped_distance(self.follower.arm, arrived.points.q[i], self.nodes.points.q[k])
             number[i[distance < tol.SAME_SEED]] = k[distance < tol.SAME_SEED]
             added = np.flatnonzero(number < 0)
             if not len(added):
                 break
             added = added[first_of_equals(self.follower, places[added], arrived.points.q[added])]
-            self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
+            added = self._add(Nodes(arrived.row[added], arrived.plane[added], rows_of(arrived.points, added)))
+            self.later, self.ends = np.append(self.later, added), np.append(self.ends, added)
         return number
 
     def _rays(self, half: Int) -> _Rays:
@@ -176,11 +193,12 @@ class _Curves:
         for _ in range(TRIES):
             points, valid = self._advance(rays)
             leaves = valid & self._leave_slab(rays, points)
-            crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
-            way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin[rays.number[leaves]])
-            valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
-            leaves &= valid
-            replace_rows(end, rays.number[leaves], rows_of(crossing, found))
+            if leaves.any():
+                crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
+                way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin[rays.number[leaves]])
+                valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
+                leaves &= valid
+                replace_rows(end, rays.number[leaves], rows_of(crossing, found))
             continues = valid & ~leaves
             replace_rows(rays.points, continues, rows_of(points, continues))
             passed.append(rows_of(rays, continues))
@@ -269,11 +287,11 @@ def _join_curves(follower: Follower, owner: Int, q: Array) -> Chains:
 
 def _chain_halves(curves: _Curves) -> Chains:
     """Halves that are joined as curves, each in one of its two senses."""
-    partner, nodes = curves.partner, curves.nodes
-    M = len(partner)
+    M, nodes = 2 * curves.count, rows_of(curves.nodes, slice(curves.count))
+    partner = curves.partner[:M]
     every, end = np.arange(M), M
     successor = np.append(np.where(partner < 0, end, partner ^ 1), end)  # the half that a curve goes on with
-    rounds = range(max(M, 1).bit_length())
+    rounds = range((2 * int(np.bincount(nodes.row, minlength=1).max())).bit_length())
     jump, ring_min = successor.copy(), np.arange(M + 1)
     for _ in rounds:
         ring_min, jump = np.minimum(ring_min, ring_min[jump]), jump[jump]

@@ -20,7 +20,7 @@ from armkin.inverse.redundant.traced_curves import Chains, curves_of
 from armkin.model.limits import SLACK
 from armkin.model.units import radian_or_reach
 
-AT_ONCE = 64  # targets whose points are worked on together
+AT_ONCE = 128  # targets whose points are worked on together
 PARTS = 4  # parts of the way between two points, at whose ends limits and the joint's sense are asked
 SECANTS = 10  # steps along a cubic to where a limit is crossed or the joint turns back
 WAY = 0.1  # share of the way, to both sides, at which a cubic's slope tells how the joint turns back, as a parabola

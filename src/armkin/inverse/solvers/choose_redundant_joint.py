@@ -77,11 +77,17 @@ def nearly_closed(arm: Arm, redundant: Redundancy) -> Redundancy:
         if redundant.task.orientation != "full" or arm.n != 7 or arm.prismatic[joint]:
             continue
         rest_arm = lock(arm, {arm.joint_names[joint]: 0.0})
-        for module in (spherical, three_parallel):
-            ideal = module.recognise(rest_arm, redundant.task, tol.NEAR_DEFECT)
-            if ideal is not None and (option := Redundancy(joint, rest_arm, redundant.task, ideal)).by_formula:
+        for ideal in near_classes(rest_arm, redundant.task):
+            if (option := Redundancy(joint, rest_arm, redundant.task, ideal)).by_formula:
                 return option
     return redundant
+
+
+@lru_cache(maxsize=64)
+def near_classes(arm: Arm, task: Task) -> tuple[Geometry, ...]:
+    """The classes of six joints that an arm misses by little."""
+    ideals = (module.recognise(arm, task, tol.NEAR_DEFECT) for module in (spherical, three_parallel))
+    return tuple(ideal for ideal in ideals if ideal is not None)
 
 
 def move_targets(arm: Arm, redundant: Redundancy, target: Array, t: Array) -> Array:
