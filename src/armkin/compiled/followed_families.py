@@ -17,7 +17,7 @@ from armkin.formula import arrays
 from armkin.formula.array_tuples import stack_rows
 from armkin.formula.arrays import Int
 from armkin.inverse.redundant.boundaries import boundaries, from_joint7
-from armkin.inverse.redundant.families import Curves, _nearest_postures
+from armkin.inverse.redundant.families import Curves, nearest_postures
 from armkin.inverse.redundant.followed_branches import Followed
 from armkin.inverse.redundant.interval_pieces import Known, Pieces
 
@@ -69,7 +69,7 @@ def _with_followed(follower: Follower, known: Known, left: Int) -> Known:
     part = follower.of(left)
     followed = Followed.along(part)
     pieces = followed.pieces
-    nearest = _nearest_postures(part.arm, followed, part.near[pieces.row])
+    nearest = nearest_postures(part.arm, followed, part.near[pieces.row])
     known.short[left], known.complete[left] = followed.short, followed.complete
     pieces = stack_rows([known.pieces, pieces._replace(row=left[pieces.row])])
     return known._replace(pieces=pieces, nearest=np.concatenate([known.nearest, nearest]))
