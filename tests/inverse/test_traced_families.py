@@ -1,5 +1,7 @@
 """Families of an arm whose other joints have no closed form: curves that are traced between answers on planes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from redundant_arms import covers_value, held_answers, redundant_postures
@@ -109,3 +111,19 @@ def test_where_a_joint_turns_back_at_the_end_of_a_curve_the_next_target_keeps_it
     mm, rad = armkin.ik(arm, target[-2:]).residual()
     assert np.nanmax(mm) <= 1e-6
     assert np.nanmax(rad) <= 1e-9
+
+
+def test_families_of_a_nearly_stretched_arm_do_not_depend_on_where_it_is_at_home() -> None:
+    """Answers with another joint held, copies near home, made planes in the wrong order: 20 and 16 rows became 26 and
+    20."""
+    arm = armkin.load("kinova_gen3")
+    rng = np.random.default_rng(3)
+    q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (60, 7))
+    q[:, 3] = np.deg2rad(rng.uniform(-2.5, 2.5, 60))
+    target, near = armkin.fk(arm, q)[[15, 19]], arm.home
+    elsewhere = replace(arm, name="elsewhere", home=np.append(3.0, arm.home[1:]))
+    listed, listed_elsewhere = armkin.ik(arm, target, near=near), armkin.ik(elsewhere, target, near=near)
+    assert listed.interval is not None
+    assert listed_elsewhere.interval is not None
+    assert listed.valid.sum(axis=1).tolist() == listed_elsewhere.valid.sum(axis=1).tolist()
+    assert np.allclose(listed.interval, listed_elsewhere.interval, atol=1e-6, equal_nan=True)

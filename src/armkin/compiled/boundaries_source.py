@@ -125,7 +125,7 @@ def lengths(bounds: Boundaries) -> list[float]:
 
 
 def roots_fields(bounds: Boundaries) -> dict[str, str]:
-    """Values of the fields about polynomials and their roots in parts/family_branches.c."""
+    """Values of the fields about polynomials and their roots in parts/family_places.c."""
     recorded, known = record_equations(bounds), lengths(bounds)
     single = {"real": "double", "suffix": "", "angles": "ARM_ANGLES", "rounding": number_text(tol.ROUNDING)}
     wide = {"real": "long double", "suffix": "_wide", "angles": "ARM_SAMPLED"}

@@ -48,7 +48,9 @@ def compile(arm: Arm, task: str | None = None) -> CompiledArm:  # noqa: A001 - `
     np.int64(4)
     """
     compiled = _compiled_arm(arm)
-    compiled._library_for(task)
+    library = compiled._library_for(task)
+    if not library.branches and (redundant := redundancy(arm, library.name)) is not None:
+        compiled._curves_of(library, redundant)
     return compiled
 
 
@@ -122,7 +124,7 @@ class CompiledArm:
             targets: (..., m) [mm, rad] by the task, or (..., 4, 4) [mm] for task "pose".
             task: what targets prescribe; by default the arm's own task.
             near: (n,) or (..., n) [rad | mm] joint values to stay close to; by default home.
-            workers: threads that share a large batch.
+            workers: threads that share a large batch, but for families, which take one.
             rounding: () or (...) [reaches, rad] how far the targets' numbers may be off; by default what the arrays
                 show.
 
@@ -143,8 +145,8 @@ class CompiledArm:
     ) -> Solutions:
         """Solutions of `armkin.ik`; for a redundant joint by machine code for its families, or for the other joints."""
         if (redundant := redundancy(self.arm, library.name)) is not None:
-            others = _solve_others if library.families is None else solve.ik  # asked for the names of branches alone
             curves_of = self._curves_of(library, redundant)
+            others = _solve_others if curves_of is None else solve.ik  # asked for names of branches, and by few targets
             return families(others, self.arm, redundant, targets, near, rounding, curves_of)
         return solve.ik(self.arm, targets, library.name, near=near, rounding=rounding)
 
@@ -153,7 +155,11 @@ class CompiledArm:
         if library.families is not None:
             return library.families.curves_of
         traced = compiled_curves(self.arm, redundant)
-        return None if traced is None else traced.of(_held_answers)
+        if traced is None:
+            return None
+        for held_arm in traced.held_arms:
+            compile(held_arm, "pose")
+        return traced.of(_held_answers)
 
     def _solve_commanded(
         self,
@@ -196,4 +202,5 @@ def _solve_others(arm: Arm, targets: ArrayLike, task: str, *, examine: bool = Tr
 
 def _held_answers(arm: Arm, targets: Array) -> Array:
     """All answers (N, B, n) of targets (N, 4, 4) by machine code for an arm with a joint held, nan for none."""
-    return compile(arm, "pose")._library_for("pose").answers(targets)
+    elimination = compile(arm, "pose")._library_for("pose").elimination
+    return solve.ik(arm, targets, "pose", examine=False).q if elimination is None else elimination.answers(targets)

@@ -34,7 +34,8 @@ def compiled_curves(arm: Arm, redundant: Redundancy) -> CompiledCurves | None:
     if redundant.about_tool_axis or redundant.by_formula or arm.prismatic.any() or arm.keep_out:
         return None
     guide = nearly_closed(arm, redundant)
-    return None if guide is redundant or (arm.ratio != 1.0).any() else CompiledCurves(arm, redundant, guide)
+    curves = None if guide is redundant else CompiledCurves(arm, redundant, guide)
+    return curves if curves is not None and curves.work_bytes else None  # without vectors C leaves all to numpy
 
 
 class CompiledCurves:
@@ -46,15 +47,15 @@ class CompiledCurves:
         self._call = code.arm_families
         self._call.argtypes, self._call.restype = [size, *[pointer] * 3, size, size, *[pointer] * 7], None
         code.arm_work_bytes.restype = size
-        self._work_bytes = code.arm_work_bytes()
+        self.work_bytes = code.arm_work_bytes()
         joint = curves_source.other_joint(guide)
-        self._held = [arm_without(arm, ((arm.joint_names[joint], value),)) for value in VALUES]
+        self.held_arms = [arm_without(arm, ((arm.joint_names[joint], value),)) for value in VALUES]
 
     def of(self, held_answers: HeldAnswers) -> CurvesOf:
         """`families.curves_in_numpy` by machine code; held_answers: solves for the others with one joint held."""
 
         def curves_of(follower: Follower) -> Iterator[Curves]:
-            memory = np.empty(self._work_bytes, np.uint8)
+            memory = np.empty(self.work_bytes, np.uint8)
             for begin in range(0, len(follower.target), AT_ONCE):
                 yield from self._curves(follower.of(slice(begin, begin + AT_ONCE)), held_answers, memory)
 
@@ -78,7 +79,7 @@ class CompiledCurves:
         which (N,) no joint moves far along any curve."""
         N, n = follower.near.shape
         target, near = np.ascontiguousarray(follower.target), np.ascontiguousarray(follower.near)
-        answers = [held_answers(arm, target) for arm in self._held]
+        answers = [held_answers(arm, target) for arm in self.held_arms]
         width = max(rows.shape[1] for rows in answers)
         held = np.full((len(answers), N, width, n - 1), np.nan)
         for k, rows in enumerate(answers):

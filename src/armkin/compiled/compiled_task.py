@@ -56,6 +56,7 @@ class CompiledTask:
         self.joint_functions = JointFunctions(arm, code)
         self.branches = library.branches
         self.families = FollowedFamilies(code) if followed is not None else None
+        self.elimination: CompiledElimination | None = None
         if not self.branches:
             return
         self.task, self.geometry = solver(self.turned, task)
@@ -65,10 +66,9 @@ class CompiledTask:
         self._batch.argtypes, self._batch.restype = [size, pointer, pointer, size, size, *[pointer] * 7], size
         code.arm_single.argtypes, code.arm_single.restype = [pointer], size
         self._single = self._single_solver(code.arm_single)
-        self._elimination: CompiledElimination | None = None
         if form is not None and c_source.has_rows(self.task, form):
             code.arm_rows.argtypes, code.arm_rows.restype = [size, *[pointer] * 3], None
-            self._elimination = CompiledElimination(self.geometry, form, code.arm_rows, self.branches, self.n)
+            self.elimination = CompiledElimination(self.geometry, form, code.arm_rows, self.branches, self.n)
 
     def ik(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None = None
@@ -83,12 +83,6 @@ class CompiledTask:
         ):
             return solutions
         return self._solve_batch(targets, near, workers, stated)
-
-    def answers(self, target: Array) -> Array:
-        """All branches (N, B, n) of targets (N, 4, 4) as they are, nan for none: neither moved nor examined."""
-        if self._elimination is None:
-            return self.ik(target, None, 1).q
-        return self._elimination.answers(target)
 
     def _solve_batch(
         self, targets: ArrayLike, near: ArrayLike | None, workers: int, stated: ArrayLike | None
@@ -204,7 +198,7 @@ class CompiledTask:
         self, batch: Results, rows: NDArray[np.intp], target: Array, near: Array, rounding: Array | None = None
     ) -> None:
         """Solve some targets in Python and write their results; near: (1, n) or (N, n)."""
-        elimination = self._elimination
+        elimination = self.elimination
         in_c = np.zeros(len(rows), bool) if elimination is None else elimination.is_complete(target[rows])
         for part, geometry in ((rows[in_c], elimination and elimination.geometry), (rows[~in_c], self.geometry)):
             if len(part) and geometry:

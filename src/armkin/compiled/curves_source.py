@@ -29,7 +29,7 @@ LEVEL = 3  # of optimisation: it unrolls loops over rows of matrices
 CORRECTIONS = 6  # steps of `newton.correct` by default
 SWEEPS = 8  # sweeps of Jacobi rotations, which converge quadratically
 _CURVES = ("curve_points", "curve_starts", "curve_joins", "curve_rays")
-_PIECES = ("curve_samples", "curves_checked", "curve_changes", "curve_pieces", "nearest_postures")
+_PIECES = ("curve_samples", "curves_checked", "curve_changes", "curve_pieces", "curve_nearest")
 
 # C on vectors `arm_many`, one number a lane; comparisons are masks
 _MASKS = {op: f"(arm_flags)({{}} {sign} {{}})" for op, sign in

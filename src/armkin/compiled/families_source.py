@@ -105,6 +105,7 @@ static void arm_others(const double *ARM_RESTRICT goal, const double *ARM_RESTRI
     }}
 }}
 """
+    assert places.shape[1] <= 32, "branches are the bits of a word"
     return text, {
         "branches": str(places.shape[1]),
         "columns": str(len(columns)),

@@ -3,7 +3,7 @@
 
 /* What is behind a node: nothing, postures beyond limits, legal ones. */
 enum { ARM_END, ARM_BEYOND, ARM_LEGAL };
-enum { ARM_CURVES = 512, ARM_POINTS_ROOM = ARM_NODES, ARM_CHANGES = 2048, ARM_PIECES = 128 };
+enum { ARM_CURVES = 127, ARM_POINTS_ROOM = ARM_NODES, ARM_CHANGES = 2048, ARM_PIECES = 128 };
 
 static const double arm_lower[ARM_JOINTS] = {@lower@}, arm_upper[ARM_JOINTS] = {@upper@};
 

@@ -305,11 +305,12 @@ static void arm_start_curves(arm_curves *f, arm_start *start)
     for (k = 0; k < ARM_PLANES; k++)
         if (arm_turns_back(missed + k))
             arm_answers_between(f, value, k);
+    f->lost |= f->postures + given > ARM_EXTRA;
     for (i = 0; i < given && f->postures < ARM_EXTRA; i++)
         memcpy(f->posture[f->postures++], given_postures[i], sizeof given_postures[i]);
     f->planes = ARM_PLANES + f->postures;
     for (i = 0; i < f->postures; i++)
-        value[ARM_PLANES + i] = f->posture[i][ARM_GUIDE];
+        value[ARM_PLANES + i] = arm_wrap(f->posture[i][ARM_GUIDE]);
     for (begin = ARM_PLANES; begin < f->planes; begin += ARM_MANY) {
         arm_many q[ARM_JOINTS * ARM_BRANCHES], defect[ARM_BRANCHES];
         const int count = arm_few(f->planes - begin);

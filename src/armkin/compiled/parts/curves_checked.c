@@ -46,8 +46,13 @@ static int arm_answers_off_curves(arm_curves *f, const arm_pieces *w, const doub
                 q[j] = j == ARM_OTHER ? value[v] : other[j - (j > ARM_OTHER)];
             for (k = 0; k < count && !(arm_distance(q, crossing[k]) < ARM_ON_CURVE); k++)
                 ;
-            if (k == count && f->postures < ARM_EXTRA)
-                memcpy(f->posture[f->postures++], q, sizeof q);
+            if (k < count)
+                continue;
+            if (f->postures == ARM_EXTRA) {
+                f->lost = 1;
+                return 0;
+            }
+            memcpy(f->posture[f->postures++], q, sizeof q);
         }
     }
     return f->postures - begin;

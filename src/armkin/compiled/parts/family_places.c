@@ -202,6 +202,10 @@ static int arm_turn_roots@suffix@(const arm_tables@suffix@ *all, const double *f
             } else
                 tail = @fmax@(tail, size * @exp@(k * (@real@)@shift@));
         }
+        if (!(total < ARM_INFINITY)) { /* nothing is known of values that are none */
+            still[f] = 1;
+            continue;
+        }
         slack = ARM_SAFE * (2 * ARM_DEGREE + 1) * tail + 10 * @rounding@ * total;
         for (k = 0; k <= ARM_DEGREE; k++) {
             const @real@ twice = k ? 2 : 1, x = twice * re[k], y = twice * im[k];

@@ -123,6 +123,7 @@ STALE_SHARE = 1e-3  # share of the last residual above which polishing stands st
 ANSWERED = 1e-12  # residual of an answer that was moved onto its target
 NO_RESIDUAL = 1e-14  # residual below which no answer comes
 MIN_VALUE = 1e-6  # singular value below which no branch is steady
+WEAK_PIVOT = 1e-6  # pivot [1] up to which an elimination may lose more than six digits
 NOISE = 1e-13  # relative size of noise that makes a matrix regular
 LEFT_OUT_VALUE = 1e-10  # singular value that a step of least norm leaves out
 CONVERGING = 1e-11  # residual below which a step has to halve it

@@ -19,7 +19,6 @@ from armkin.model.units import radian_or_reach
 
 MAX_STEP = 0.3  # length [rad, reaches], at most, of one step of Newton's method
 NEWTON = 4  # steps of Newton's method onto the curve
-WEAK_PIVOT = 1e-6  # pivot [1] up to which an elimination may lose more than six digits
 FEW_POSTURES = 100  # postures of which no elimination in common is faster
 AT_ONCE = 3000  # postures that Newton's method works on at once: they stay in the cache
 
@@ -93,7 +92,7 @@ def _steps(follower: Follower, q: Array, target: Array, last: Array) -> Array:
     equations, n = _equations(follower, q, target, last), follower.arm.n
     if len(q) < FEW_POSTURES or len(equations) != n:
         return _one_by_one(equations)
-    rows = np.flatnonzero(eliminate(equations, WEAK_PIVOT))
+    rows = np.flatnonzero(eliminate(equations, tol.WEAK_PIVOT))
     x = equations[:, n:].swapaxes(0, 1)
     if len(rows):
         x[:, :, rows] = _one_by_one(_equations(follower, q[rows], target[rows], last[rows]))

@@ -111,7 +111,7 @@ def _starts_on_planes(
     q, defect = source.candidates(row, t)
     between, answers = _answers_between(source, values, defect.reshape(N, PLANES, -1))
     own_row, extra = np.append(between, owner), np.append(answers, postures, axis=0)
-    own_t = extra[:, guide.joint].copy()
+    own_t = wrap_angle(extra[:, guide.joint])
     own_q, own_defect = source.candidates(own_row, own_t)
     solving = np.append(defect, own_defect, axis=0) < tol.NEAR_DEFECT
     return np.append(row, own_row), np.append(t, own_t), np.append(q, own_q, axis=0), solving, extra

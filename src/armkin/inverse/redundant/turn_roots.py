@@ -80,7 +80,7 @@ def roots(values: NDArray[np.complex128], degree: int) -> Roots:
     slack = SAFE * (2 * degree + 1) * tail.max(axis=1) + 10.0 * tol.ROUNDING * np.abs(c).sum(axis=1)
     a = (np.concatenate([c.real, c.imag], axis=1) @ series).reshape(-1, TERMS)
     index, angle = np.repeat(np.arange(F), len(middle)), np.tile(middle, F)
-    found_which, found_at, decided = [], [], np.ones(F, bool)
+    found_which, found_at, decided = [], [], np.isfinite(slack)
     for _ in range(HALVINGS):
         sizes, blur = np.abs(a), slack[index]
         candidates = np.flatnonzero(sizes[:, 0] <= sizes[:, 1:].sum(axis=1) + blur)
