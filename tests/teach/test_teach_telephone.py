@@ -25,6 +25,16 @@ gl.getExtension = function (name) {
 _NO_LEGEND = (
     "() => Object.assign(document.querySelector('#legend').style, { position: 'absolute', visibility: 'hidden' })"
 )
+# Resolves when the window has not scrolled for six frames: what a finger leaves behind scrolls on.
+_AT_REST = """() => new Promise((resolve) => {
+  let [last, still] = [-1, 0];
+  const look = () => {
+    still = scrollY === last ? still + 1 : 0;
+    last = scrollY;
+    if (still > 5) resolve(); else requestAnimationFrame(look);
+  };
+  look();
+})"""
 # How far down the picture its buttons reach [px].
 _BELOW = """() => document.querySelector('#views').getBoundingClientRect().bottom
   - document.querySelector('#canvas').getBoundingClientRect().top + 2"""
@@ -45,6 +55,7 @@ def test_a_telephone_s_window(browser: Browser) -> None:
         # A finger that swipes over a slider scrolls, and turns no joint; one that goes along it does.
         slider = page.locator("#sliders input[type=range]").nth(1)
         slider.scroll_into_view_if_needed()
+        page.evaluate(_AT_REST)
         line = page.context.new_cdp_session(page)
         for across, down, turns in ((1, -12, False), (8, 1, True)):
             rect = slider.bounding_box()
@@ -57,6 +68,7 @@ def test_a_telephone_s_window(browser: Browser) -> None:
             line.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
             if not turns:
                 wait_until(page, "scrollY > argument", scrolled)
+            page.evaluate(_AT_REST)
             wait_for_answers(page)
             assert (box_value(page, "#box-1") != before) is turns
             assert slider.evaluate("one => one.valueAsNumber") == pytest.approx(box_value(page, "#box-1"), abs=0.02)
