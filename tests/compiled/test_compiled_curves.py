@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import armkin
-from armkin.compiled import compiled_arm, compiled_curves
+from armkin.compiled import compiled_arm, compiled_curves, known_curves
+from armkin.formula.array_tuples import rows_of
 from armkin.inverse import solve
-from armkin.inverse.redundant.families import families
-from armkin.inverse.redundant.traced_families import trace_families
+from armkin.inverse.redundant.families import curves_in_numpy, families
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
 
 # Motion [deg] by which a posture may be further than numpy's: where the redundant joint turns back, rounding leaves its
@@ -89,9 +89,9 @@ def left(monkeypatch: pytest.MonkeyPatch) -> list[int]:
 
     def count_and_trace(follower):  # type: ignore[no-untyped-def]
         counts.append(len(follower.target))
-        return trace_families(follower)
+        return curves_in_numpy(follower)
 
-    monkeypatch.setattr(compiled_curves, "trace_families", count_and_trace)
+    monkeypatch.setattr(known_curves, "curves_in_numpy", count_and_trace)
     return counts
 
 
@@ -148,11 +148,10 @@ def test_targets_that_are_left_to_numpy_stand_in_their_places(monkeypatch: pytes
     solve_all = compiled_curves.CompiledCurves._solve
 
     def leave_some(self, *given):  # type: ignore[no-untyped-def]
-        pieces, nearest, counts, small = solve_all(self, *given)
-        unsolved = np.isin(np.arange(len(counts)), [0, 3, 4, 8])
-        rows = ~unsolved[pieces.row]
-        kept = pieces._replace(**{name: column[rows] for name, column in pieces._asdict().items()})
-        return kept, nearest[rows], np.where(unsolved, -1, counts), small
+        known, left = solve_all(self, *given)
+        unsolved = left | np.isin(np.arange(len(left)), [0, 3, 4, 8])
+        rows = ~unsolved[known.pieces.row]
+        return known._replace(pieces=rows_of(known.pieces, rows), nearest=known.nearest[rows]), unsolved
 
     monkeypatch.setattr(compiled_curves.CompiledCurves, "_solve", leave_some)
     assert_as_by_numpy(arm, target, None)

@@ -12,9 +12,10 @@ import pytest
 
 import armkin
 from armkin import Status
-from armkin.compiled import c_source, followed_families
+from armkin.compiled import c_source, known_curves
 from armkin.compiled.families_source import followed_redundancy
 from armkin.inverse.redundant.boundaries import boundaries, from_joint7
+from armkin.inverse.redundant.families import curves_in_numpy
 from armkin.inverse.redundant.interval_pieces import motion
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "inverse"))
@@ -170,13 +171,12 @@ def test_a_posture_that_stands_on_its_target_stays() -> None:
 def test_few_targets_are_left_to_python(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of 10,000 random ones 18 are."""
     arm, counts = armkin.load("panda"), [0]
-    follow = followed_families._with_followed
 
-    def count_and_follow(follower, known, left):  # type: ignore[no-untyped-def]
-        counts.append(len(left))
-        return follow(follower, known, left)
+    def count_and_follow(follower):  # type: ignore[no-untyped-def]
+        counts.append(len(follower.target))
+        return curves_in_numpy(follower)
 
-    monkeypatch.setattr(followed_families, "_with_followed", count_and_follow)
+    monkeypatch.setattr(known_curves, "curves_in_numpy", count_and_follow)
     _, target = redundant_postures(arm, None, 1000, 11)
     fast = armkin.compile(arm)
     assert (fast.ik(target).best >= 0).all()

@@ -7,7 +7,7 @@ import ctypes
 import numpy as np
 
 from armkin.compiled import toolchain
-from armkin.compiled.c_source import PARTS
+from armkin.compiled.own_parts import PARTS
 from armkin.export.c.source_parts import part_text
 
 AROUND = """

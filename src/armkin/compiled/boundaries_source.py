@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from armkin.compiled.own_parts import own_part
 from armkin.export.c.c_program import fill_fields
 from armkin.formula import arrays, c_and_js_code, recording
 from armkin.formula.arrays import Entry
@@ -20,7 +20,6 @@ from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant import turn_roots
 from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
 
-PART = Path(__file__).parent / "parts" / "family_places.c"
 MOVED_ROOT = 1e-8  # way [rad] of a root by the bound of its rounding, above which more digits are used
 INPUT_SHARE = 0.1  # share of rounding that the target's own numbers have, however many digits are used
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
@@ -156,4 +155,4 @@ def _roots_code(recorded: recording.Recording, known: list[float], fields: dict[
     lines += [*code.lines, *(f"value[{k}][i] = {texts[0]};" for k, texts in enumerate(code.outputs))]
     fields = fields | {name: name + ending for name in FUNCTIONS}
     fields |= {"shift": number_text(turn_roots.SHIFT), "equations": "\n".join(f"        {line}" for line in lines)}
-    return fill_fields(PART.read_text(encoding="utf-8"), fields)
+    return fill_fields(own_part("family_places"), fields)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from armkin.compiled import families_source
+from armkin.compiled.own_parts import own_part
 from armkin.export import arm_formulas, class_forms
 from armkin.export.c import c_elimination, c_functions, c_program, keep_out_tables
 from armkin.export.c.source_parts import part_text
@@ -49,9 +49,6 @@ if TYPE_CHECKING:
     from armkin.inverse.tasks.task import Task
     from armkin.model.arm import Arm
 
-PARTS = Path(__file__).parent / "parts"
-
-
 LANES = 16  # poses computed together, for vectors of any length and blocks of a few kilobytes
 POSES = 8  # poses of an elimination computed together, a multiple of the lanes of its vectors
 _LOCKSTEP = ("lanes", "lanes_eigenvalues", "lanes_pencil", "lanes_roots", "lanes_equal_roots", "lanes_pass")
@@ -81,18 +78,18 @@ def library(
     solve, branches, level = "", 0, 3
     if task is not None and geometry is not None and class_forms.has_form(geometry):
         solve, branches = c_program.candidates_code(
-            arm, task, geometry, prefer=False, lanes="".join(map(_part_text, _LOCKSTEP))
+            arm, task, geometry, prefer=False, lanes="".join(map(own_part, _LOCKSTEP))
         )
     fields = {
         "about": f"{c_program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
         "lanes": str(LANES),
     }
-    parts = [_part_text("head"), c_program.settings(), _fast_numbers()]
+    parts = [own_part("head"), c_program.settings(), _fast_numbers()]
     parts += [c_functions.forward_kinematics(commanded), _joint_loop("Poses", "arm_pose", 16)]
     parts += [c_functions.position_code(commanded), _joint_loop("Positions of the tool", "arm_point", 3)]
     if commanded.keep_out and commanded.whole is None:
-        parts += [keep_out_tables.clearances_code(commanded), _part_text("clearances")]
+        parts += [keep_out_tables.clearances_code(commanded), own_part("clearances")]
         parts += [_joint_loop("Least clearances and their pairs", "arm_clearance", 2)]
     if redundant is not None:
         parts += [part_text("whole_turns"), families_source.families_code(arm, redundant)]
@@ -107,9 +104,9 @@ def library(
         fields["index"] = "b" if geometry is not None and geometry.ordered else "place"
         gather = "gather_pose" if task.orientation == "full" else "gather_numbers"
         jacobian, folds = _fold_code(arm, task, geometry, branches, fields)
-        parts += [*jacobian, _part_text("lane_sizes"), solve, part_text("whole_turns"), _choose_code(arm, branches)]
-        parts += [_part_text(gather), folds, _part_text("batch")]
-        parts += [_part_text("elimination_rows")] if has_rows(task, geometry) else []
+        parts += [*jacobian, own_part("lane_sizes"), solve, part_text("whole_turns"), _choose_code(arm, branches)]
+        parts += [own_part(gather), folds, own_part("batch")]
+        parts += [own_part("elimination_rows")] if has_rows(task, geometry) else []
     text = c_program.fill_fields("\n".join(parts), {**fields, "content": "@content@"})
     content = hashlib.sha256(text.encode()).hexdigest()
     return Library(text.replace("@content@", content), content, branches, level)
@@ -120,10 +117,10 @@ def _fold_code(
 ) -> tuple[list[str], str]:
     """The Jacobian, if C judges targets on an edge, and the code that judges them or leaves them to Python."""
     if geometry is None or not _can_judge_folds(arm, task, geometry) or branches > LANES:
-        return [], _part_text("no_folds")
-    text = _part_text("folds")
+        return [], own_part("no_folds")
+    text = own_part("folds")
     for field, part in (("@followed@", "branch_to_fold"), ("@twins@", "twin_branches")):
-        text = text.replace(field, _part_text(part) + "\n")
+        text = text.replace(field, own_part(part) + "\n")
     return [c_functions.jacobian_code(arm)], c_program.fill_fields(text, _fold_fields(arm, task) | fields)
 
 
@@ -207,13 +204,9 @@ def _farthest_coordinate(arm: Arm) -> float:
     return max((FAR_DISTANCE * arm.reach - math.hypot(*arm.link[0][:3, 3])) / 2, 0.0)
 
 
-def _part_text(name: str) -> str:
-    return (PARTS / f"{name}.c").read_text(encoding="utf-8")
-
-
 def _joint_loop(content: str, formula: str, size: int) -> str:
     """A loop over a batch of joint values."""
-    return c_program.fill_fields(_part_text("joint_batches"), {"what": content, "formula": formula, "size": str(size)})
+    return c_program.fill_fields(own_part("joint_batches"), {"what": content, "formula": formula, "size": str(size)})
 
 
 def _fast_numbers() -> str:
@@ -245,7 +238,7 @@ def _choose_code(arm: Arm, branches: int) -> str:
         choices = zip(("if (wide == 0)", "else if (wide == 1)", "else"), (copied, nearest, positive), strict=True)
         loops.append(f"wide = {range_test};\n" + " ".join(f"{condition} {{\n{loop}\n}}" for condition, loop in choices))
     body = "\n".join(f"        {line}" for line in "\n".join(loops).splitlines())
-    return f"""{_part_text("half_turn_in_limits")}
+    return f"""{own_part("half_turn_in_limits")}
 static void arm_choose(const double *ARM_RESTRICT near, double *ARM_RESTRICT q, int *ARM_RESTRICT inside,
     int count)
 {{

@@ -5,17 +5,16 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from armkin.compiled import curves_source, toolchain
-from armkin.formula.array_tuples import rows_of
-from armkin.formula.arrays import Array, Int
+from armkin.compiled.known_curves import in_stretches
+from armkin.formula.arrays import Array, Bool
 from armkin.inverse.redundant.curve_starts import VALUES
 from armkin.inverse.redundant.families import Curves, CurvesOf
 from armkin.inverse.redundant.interval_pieces import Known, Pieces
-from armkin.inverse.redundant.traced_families import trace_families
 from armkin.inverse.solvers.choose_redundant_joint import Redundancy, arm_without, nearly_closed
 
 if TYPE_CHECKING:
@@ -57,26 +56,13 @@ class CompiledCurves:
         def curves_of(follower: Follower) -> Iterator[Curves]:
             memory = np.empty(self.work_bytes, np.uint8)
             for begin in range(0, len(follower.target), AT_ONCE):
-                yield from self._curves(follower.of(slice(begin, begin + AT_ONCE)), held_answers, memory)
+                part = follower.of(slice(begin, begin + AT_ONCE))
+                yield from in_stretches(part, *self._solve(part, held_answers, memory))
 
         return curves_of
 
-    def _curves(self, follower: Follower, held_answers: HeldAnswers, memory: Any) -> Iterator[Curves]:
-        pieces, nearest, counts, small = self._solve(follower, held_answers, memory)
-        ends = np.append(0, np.cumsum(np.maximum(counts, 0)))
-        # stretches of targets that were solved, and that are left
-        bounds = np.flatnonzero(np.diff(counts < 0, prepend=counts[:1] >= 0)).tolist()
-        for a, b in zip(bounds, [*bounds[1:], len(counts)], strict=True):
-            if counts[a] < 0:
-                yield from trace_families(follower.of(slice(a, b)))
-                continue
-            part = slice(ends[a], ends[b])
-            own = rows_of(pieces, part)
-            yield Known(own._replace(row=own.row - a), small[a:b], np.zeros(b - a, bool), nearest[part])
-
-    def _solve(self, follower: Follower, held_answers: HeldAnswers, memory: Any) -> tuple[Pieces, Array, Int, Any]:
-        """Pieces of targets N with their nearest postures, how many of each (N,), -1 of those left to numpy, and on
-        which (N,) no joint moves far along any curve."""
+    def _solve(self, follower: Follower, held_answers: HeldAnswers, memory: Any) -> tuple[Known, Bool]:
+        """Curves of targets N, none of those that are left to numpy, and which are (N,)."""
         N, n = follower.near.shape
         target, near = np.ascontiguousarray(follower.target), np.ascontiguousarray(follower.near)
         answers = [held_answers(arm, target) for arm in self.held_arms]
@@ -94,4 +80,4 @@ class CompiledCurves:
         a, b = ends[:total].T
         row, zero = np.repeat(np.arange(N), np.maximum(counts, 0)), np.zeros(total)
         pieces = Pieces(row, curve[:total], legal[:total], a, b, a, b, zero, zero, zero, nearest[:total])
-        return pieces, nearest[:total], cast(Int, counts), small
+        return Known(pieces, small, np.zeros(N, bool), nearest[:total]), counts < 0

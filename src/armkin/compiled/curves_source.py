@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import re
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from armkin import forward
+from armkin.compiled.own_parts import own_part
 from armkin.export import arm_formulas
 from armkin.export.c import c_program
 from armkin.export.c.source_parts import part_text
@@ -24,7 +24,6 @@ from armkin.model.rotation import SMALL_TURN
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
-PARTS = Path(__file__).parent / "parts"
 LEVEL = 3  # of optimisation: it unrolls loops over rows of matrices
 CORRECTIONS = 6  # steps of `newton.correct` by default
 SWEEPS = 8  # sweeps of Jacobi rotations, which converge quadratically
@@ -56,9 +55,9 @@ def library(arm: Arm, redundant: Redundancy, guide: Redundancy) -> tuple[str, st
     """The C file and its content's sha256, also in the file as `arm_content`."""
     branches, candidates = _candidates_code(arm, guide)
     settings = _settings(arm, (guide.joint, redundant.joint, other_joint(guide)), branches)
-    parts = [_part_text("head"), c_program.settings(), part_text("numbers_double"), part_text("whole_turns")]
-    parts += ["#ifdef ARM_MANY", _part_text("lanes"), _part_text("lanes_functions"), *_formulas(arm), candidates]
-    parts += [settings, *map(_part_text, _CURVES + _PIECES), "#endif", _part_text("traced_families")]
+    parts = [own_part("head"), c_program.settings(), part_text("numbers_double"), part_text("whole_turns")]
+    parts += ["#ifdef ARM_MANY", own_part("lanes"), own_part("lanes_functions"), *_formulas(arm), candidates]
+    parts += [settings, *map(own_part, _CURVES + _PIECES), "#endif", own_part("traced_families")]
     fields = {
         "about": f"{c_program.identifier(arm.name)}: built for this computer by armkin.compile.",
         "joints": str(arm.n),
@@ -140,7 +139,3 @@ def _candidates_code(arm: Arm, guide: Redundancy) -> tuple[int, str]:
 def _function(head: str, lines: list[str], stores: list[str]) -> str:
     body = "\n".join(f"    {line}" for line in [*lines, *stores])
     return f"{head}\n{{\n{body}\n}}\n"
-
-
-def _part_text(name: str) -> str:
-    return (PARTS / f"{name}.c").read_text(encoding="utf-8")

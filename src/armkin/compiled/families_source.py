@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from armkin.compiled import boundaries_source
+from armkin.compiled.own_parts import own_part
 from armkin.export.c.c_program import fill_fields
+from armkin.export.c.source_parts import part_text
 from armkin.formula import c_and_js_code, recording
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.closed.candidates import recorded_formula
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from armkin.inverse.solvers.choose_redundant_joint import Redundancy
     from armkin.model.arm import Arm
 
-PARTS = Path(__file__).parent / "parts"
 INSIDE_STEPS = 1e-13, 1e-11, 1e-9  # ways [rad] from a branch's end to where it may be there
 PART_NAMES = "family_branches", "family_nearest", "followed_families"
 MAX_PIECES = 64  # pieces, at most, of a target in C
@@ -49,6 +49,7 @@ def families_code(arm: Arm, redundant: Redundancy) -> str:
     bounds = boundaries(arm)
     assert bounds is not None
     fields |= boundaries_source.roots_fields(bounds) | {
+        "turns": part_text("turns"),
         "others": form,
         "accepted": number_text(tol.ACCEPTED**2),
         "reach": number_text(tol.REACH),
@@ -63,7 +64,7 @@ def families_code(arm: Arm, redundant: Redundancy) -> str:
         "lower": _numbers(arm.lower),
         "upper": _numbers(arm.upper),
     }
-    text = "\n".join((PARTS / f"{name}.c").read_text(encoding="utf-8") for name in PART_NAMES)
+    text = "\n".join(map(own_part, PART_NAMES))
     return fill_fields(text, fields)
 
 
@@ -93,14 +94,16 @@ def _others_code(arm: Arm, redundant: Redundancy) -> tuple[str, dict[str, str]]:
     columns.append((n - 1, "t[i]"))
     stores = [f"value[{k} * ARM_LANES + i] = {text};" for k, (_, text) in enumerate(columns)]
     stores += [f"miss[{k} * ARM_LANES + i] = {text};" for k, text in enumerate(code.outputs[n - 1])]
-    body = "\n".join(f"        {line}" for line in ["arm_circle(t[i], &c, &s);", *code.lines, *stores])
+    body = "\n".join(f"        {line}" for line in ["const double c = cosine[i], s = sine[i];", *code.lines, *stores])
     text = f"""/* All branches of the other joints at values t of the redundant one. */
 static void arm_others(const double *ARM_RESTRICT goal, const double *ARM_RESTRICT t, double *ARM_RESTRICT value,
     double *ARM_RESTRICT miss)
 {{
+    double cosine[ARM_LANES], sine[ARM_LANES];
     int i;
+    for (i = 0; i < ARM_LANES; i += 8)
+        arm_turns(t + i, cosine + i, sine + i);
     for (i = 0; i < ARM_LANES; i++) {{
-        double c, s;
 {body}
     }}
 }}

@@ -13,12 +13,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armkin.compiled.families_source import MAX_PIECES
+from armkin.compiled.known_curves import in_stretches
 from armkin.formula import arrays
-from armkin.formula.array_tuples import stack_rows
-from armkin.formula.arrays import Int
 from armkin.inverse.redundant.boundaries import boundaries, from_joint7
-from armkin.inverse.redundant.families import Curves, nearest_postures
-from armkin.inverse.redundant.followed_branches import Followed
+from armkin.inverse.redundant.families import Curves
 from armkin.inverse.redundant.interval_pieces import Known, Pieces
 
 if TYPE_CHECKING:
@@ -41,8 +39,7 @@ class FollowedFamilies:
         for rows in arrays.slices(len(follower.target), AT_ONCE):
             part = follower.of(rows)
             known = self._known(part)
-            left = np.flatnonzero(~known.complete)
-            yield _with_followed(part, known, left) if len(left) else known
+            yield from in_stretches(part, known, ~known.complete)
 
     def _known(self, follower: Follower) -> Known:
         """Curves of some targets, none of those that are left to Python, which are not complete."""
@@ -62,14 +59,3 @@ class FollowedFamilies:
         a, b = interval[used].T
         pieces = Pieces(row, branch[used], legal[used], a, b, a, b, a, a, b, q)
         return Known(pieces, state == SHORT_STATE, state != LEFT_STATE, q)
-
-
-def _with_followed(follower: Follower, known: Known, left: Int) -> Known:
-    """The curves with those of targets left to Python (M,)."""
-    part = follower.of(left)
-    followed = Followed.along(part)
-    pieces = followed.pieces
-    nearest = nearest_postures(part.arm, followed, part.near[pieces.row])
-    known.short[left], known.complete[left] = followed.short, followed.complete
-    pieces = stack_rows([known.pieces, pieces._replace(row=left[pieces.row])])
-    return known._replace(pieces=pieces, nearest=np.concatenate([known.nearest, nearest]))

@@ -31,26 +31,7 @@ static const double arm_least[ARM_JOINTS] = {@lower@}, arm_most[ARM_JOINTS] = {@
 static const int arm_joint_of[ARM_COLUMNS] = {@joint_of@};
 static const int arm_column[ARM_WAYS][ARM_JOINTS] = {@column@}, arm_missed[ARM_WAYS] = {@missed@};
 
-/* Cosine and sine. Coefficients: S. L. Moshier, Cephes Mathematical Library (sin.c). */
-ARM_INLINE void arm_circle(double q, double *cosine, double *sine)
-{
-    const double k = rint(q * 0.6366197723675814);
-    const double r = ((q - k * 1.570796310901641845703125) - k * 1.589325471229585673428e-8)
-        - k * 6.12323399573676588614e-17;
-    const double z = r * r;
-    const double s = r + r * z * (((((1.58962301576546568060e-10 * z - 2.50507477628578072866e-8) * z
-        + 2.75573136213857242213e-6) * z - 1.98412698295895385996e-4) * z + 8.33333333332211858878e-3) * z
-        - 1.66666666666666307295e-1);
-    const double c = 1.0 - z / 2 + z * z * (((((-1.13585365213876817300e-11 * z + 2.08757008419747316778e-9) * z
-        - 2.75573141792967388112e-7) * z + 2.48015872888517045348e-5) * z - 1.38888888888730564116e-3) * z
-        + 4.16666666666665929218e-2);
-    const double half = rint(k / 2), odd = k - 2 * half;
-    const double sign = 1 - 2 * fabs(half - 2 * rint(half / 2));
-    const double across = odd * sign, along = (1 - fabs(odd)) * sign;
-    *cosine = along * c - across * s;
-    *sine = along * s + across * c;
-}
-
+@turns@
 @others@
 @roots@
 @roots_wide@

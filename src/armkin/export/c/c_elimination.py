@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from armkin.model.arm import Arm
 
 # each part needs the previous ones
-_METHOD = ("linear_algebra", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
+_METHOD = ("linear_algebra", "turns", "line_features", "end_joints", "roots", "equal_roots", "polish", "elimination")
 _NAMED = {  # numbers of the method, by their names in Python
     name: getattr(tolerances, name)
     for name in (

@@ -170,7 +170,7 @@ class _Rows:
         rows = slice(begin, self.added)
         self.complete[rows], self.short[rows] = curves.complete, curves.short
         near = self.near[begin + pieces.row]
-        q = curves.nearest.copy() if isinstance(curves, Known) else nearest_postures(self.arm, curves, near)
+        q = curves.nearest.copy() if isinstance(curves, Known) else _nearest_postures(self.arm, curves, near)
         if isinstance(curves, Traced):
             q = curves.without_residual(pieces, q)
         near_rows = np.flatnonzero(self.stands[begin + pieces.row])
@@ -218,7 +218,7 @@ class _Rows:
         return q, interval, legal, branch
 
 
-def nearest_postures(arm: Arm, curves: Turning | Followed | Traced, near: Array) -> Array:
+def _nearest_postures(arm: Arm, curves: Turning | Followed | Traced, near: Array) -> Array:
     """The postures (P, n) of pieces that move the joints least from near (P, n): golden section around the best sample,
     then where a joint stands as near has it.
 
