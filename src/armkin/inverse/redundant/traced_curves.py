@@ -25,8 +25,8 @@ HALVINGS = 6  # halvings of the way between two answers
 ARC_LENGTH = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
 MAX_STEP = 0.3  # longest step [rad, reaches] along a curve
 SIDE_SHARE = 0.3  # distance, as a share of a step, that Newton's method moves a point sideways at most
-TRIES = 100  # steps, at most, of one arc
-ROUNDS = 20  # arcs, at most, of one curve, each to the next plane
+TRIES = 400  # steps, at most, of rays that follow on one another
+ROUNDS = 20  # traces, at most
 
 
 class _Rays(NamedTuple):
@@ -122,29 +122,26 @@ class _Curves:
         slab = self.planes.place(self.nodes.row[half >> 1], self.slab(half))
         order, every = np.argsort(slab, kind="stable"), np.arange(len(half))
         half, slab = half[order], slab[order]
-        first, slab_end = np.searchsorted(slab, slab, "left"), np.searchsorted(slab, slab, "right")
-        place = first[:, None] + np.arange(max((slab_end - first).max(initial=0), 1))
-        a, b = np.broadcast_to(every[:, None], place.shape), np.minimum(place, len(half) - 1)
-        begin, end = self.nodes.leaving(half), self.nodes.leaving(half[b])
-        chord = newton.difference(self.follower.arm, end.q, begin.q[:, None])
-        advance = (chord * (begin.tangent[:, None] - end.tangent)).sum(axis=2)
-        cost = 2.0 * np.sqrt((chord * chord).sum(axis=2)) - 0.5 * advance
-        cost[(advance <= 0) | (place >= slab_end[:, None]) | (a == b)] = np.inf
-        nearest = cost.argmin(axis=1)
-        partner = np.where(np.isfinite(cost[every, nearest]), b[every, nearest], -1)
+        first, count = np.searchsorted(slab, slab, "left"), np.unique(slab, return_counts=True)[1]
+        count = np.repeat(count, count)  # of the halves in its slab
+        a, b = np.repeat(every, count), np.repeat(first, count) + numbers_within(count)
+        begin, end = self.nodes.leaving(half[a]), self.nodes.leaving(half[b])
+        chord = newton.difference(self.follower.arm, end.q, begin.q)
+        advance = (chord * (begin.tangent - end.tangent)).sum(axis=1)
+        cost = np.where(advance > 0, 2.0 * np.sqrt((chord * chord).sum(axis=1)) - 0.5 * advance, np.inf)
+        least = np.minimum.reduceat(cost, np.cumsum(count) - count) if len(half) else cost
+        nearest = np.flatnonzero((cost == np.repeat(least, count)) & (advance > 0))[::-1]
+        partner = np.full(len(half), -1)
+        partner[a[nearest]] = b[nearest]  # the first one of several
         mutual = np.flatnonzero((partner > every) & (partner[partner] == every))
         self._join(half[mutual], half[partner[mutual]])
 
     def trace(self) -> None:
-        """Open halves, step by step to where they leave their slab."""
+        """Open halves, step by step to the nodes that they come to."""
         half = self.open()
-        half = half[~self.traced[half]]
+        half, goal, passed = self._follow_rays(half[~self.traced[half]])
         self.traced[half] = True
-        passed, end = self._follow_rays(half)
-        arrived, every = np.flatnonzero(end.plane >= 0), np.arange(len(half))
-        node = self._on_plane(rows_of(end, arrived))
-        goal = np.full(len(half), -1)
-        goal[arrived] = 2 * node + (end.plane != self.slab(half))[arrived]
+        every = np.arange(len(half))
         place = np.where(np.isin(goal, half), np.searchsorted(half, goal), len(half))
         # an arc is traced from both of its ends: one of the two traces is kept
         selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place) & (goal != half)
@@ -185,28 +182,38 @@ class _Curves:
         points = onto_curves(self.follower, row, points.q, points.tangent)  # as near as short steps need
         return _Rays(np.arange(len(half)), row, slab, low + half_width, half_width, step, points)
 
-    def _follow_rays(self, half: Int) -> tuple[_Rays, Nodes]:
-        """Halves (M,) step by step through their slabs: as rays at all points that they pass on the way, and the nodes
-        that they come to (M,), on plane -1 where a ray is lost."""
-        origin, rays, passed = self.nodes.points.q[half >> 1], self._rays(half), []
-        end = Nodes(rays.row, np.full(len(half), -1), rows_of(rays.points, rays.number))
+    def _follow_rays(self, half: Int) -> tuple[Int, Int, _Rays]:
+        """Halves (M,), step by step to where they leave their slabs, and from there, where no node was, on.
+
+        Returns:
+            The halves that were followed (R,), in their order, those that they come to (R,), -1 where a ray is lost,
+            and the rays at all points that they pass on the way.
+        """
+        rays, goal, passed = self._rays(half), np.full(len(half), -1), []
         for _ in range(TRIES):
             points, valid = self._advance(rays)
-            leaves = valid & self._leave_slab(rays, points)
+            leaves, count = valid & self._leave_slab(rays, points), self.count
             if leaves.any():
                 crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
-                way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin[rays.number[leaves]])
+                origin = self.nodes.points.q[half[rays.number[leaves]] >> 1]
+                way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin)
                 valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
                 leaves &= valid
-                replace_rows(end, rays.number[leaves], rows_of(crossing, found))
+                arrived = 2 * self._on_plane(rows_of(crossing, found))
+                goal[rays.number[leaves]] = arrived + (crossing.plane[found] != rays.slab[leaves])
             continues = valid & ~leaves
             replace_rows(rays.points, continues, rows_of(points, continues))
             passed.append(rows_of(rays, continues))
             rays = rays._replace(step=np.where(valid, np.minimum(1.5 * rays.step, MAX_STEP), 0.5 * rays.step))
             rays = rows_of(rays, ~leaves & (rays.step > tol.SHORTEST_ARC))
+            onward = np.setdiff1d(np.arange(2 * count, 2 * self.count), goal)
+            if len(onward):
+                number = np.arange(len(half), len(half) + len(onward))
+                half, goal = np.append(half, onward), np.append(goal, np.full(len(onward), -1))
+                rays = stack_rows([rays, self._rays(onward)._replace(number=number)])
             if not len(rays.number):
                 break
-        return stack_rows(passed), end
+        return half, goal, stack_rows(passed)
 
     def _advance(self, rays: _Rays) -> tuple[Points, Bool]:
         """The points to which a step along the tangents leads rays (R,), and whether along their curves."""

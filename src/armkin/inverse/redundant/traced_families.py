@@ -106,7 +106,8 @@ class Traced(NamedTuple):
         arm, j, P = self.follower.arm, self.follower.redundant.joint, len(self.row)
         point, parts = np.repeat(np.arange(P), PARTS), np.arange(PARTS) / PARTS
         part, samples = np.tile(parts, P), [self.ways.at(self.follower, u) for u in parts]
-        q = np.stack(samples, axis=1).reshape(-1, arm.n)
+        # joint after joint in memory, as `margin` and `motion` read them
+        q = np.stack(samples).transpose(2, 1, 0).reshape(arm.n, -1).T
         rises = (np.stack([self.ways.slope(u, j) for u in parts], axis=1) > 0).ravel()
         alive = self.after[point] != point
         following = np.arange(1, len(point) + 1)
@@ -119,12 +120,13 @@ class Traced(NamedTuple):
         turn_share[turns], turn_q = self._turning(point[turns], part[turns])
         cell = np.concatenate([np.arange(len(point)), crosses, turns])
         share = np.concatenate([part, cross_share[crosses], turn_share[turns]])
-        posture = np.concatenate([q, cross_q, turn_q])
+        postures = np.concatenate([q.T, cross_q.T, turn_q.T], axis=1)
         order = np.lexsort((share, cell))
         cell, share = cell[order], share[order]
         point = point[cell]
         return _Nodes(
-            np.minimum(point + share, np.nextafter(point + 1.0, 0.0)), posture[order],  # at the end still of its curve
+            np.minimum(point + share, np.nextafter(point + 1.0, 0.0)),  # at the end still of its curve
+            postures.take(order, axis=1).T,
             np.where(cross_share[cell] <= share, next_legal[cell], legal[cell]) & alive[cell],
             np.where(turn_share[cell] <= share, next_rises[cell], rises[cell]), alive[cell],
         )  # fmt: skip
@@ -194,7 +196,8 @@ class _Nodes(NamedTuple):
     def of_curves(self, curves: Traced, row: Int, branch: Int) -> Pieces:
         """The pieces of curves (C,), which begin with the posture of their best node."""
         node, value = self._table(curves)
-        near, K = curves.follower.near[curves.row[self.at.astype(np.intp)]], node.shape[1]
+        near = curves.follower.near.T.take(curves.row[self.at.astype(np.intp)], axis=1).T
+        K = node.shape[1]
         curve, first, length, legal = self._runs(node)
         q, fits = nearest_row(curves.follower.arm, self.q, near)
         cost = motion(curves.follower.arm, q, near)
@@ -239,9 +242,10 @@ class _Nodes(NamedTuple):
 
 def _ends_of_pieces(value: Array, curve: Int, first: Int, length: Int) -> tuple[Array, Array]:
     """The least and the largest value of a joint along runs (R,) of curves' nodes, at which it has values (C, K)."""
-    change = np.cumsum(np.tile(wrap_angle(np.roll(value, -1, axis=1) - value), 2), axis=1)
-    change = np.concatenate([np.zeros((len(value), 1)), change], axis=1)
+    K = value.shape[1]
+    change = np.cumsum(np.pad(wrap_angle(np.roll(value, -1, axis=1) - value), [(0, 0), (1, 0)]), axis=1)
+    rounds, last = np.divmod(first + length, K)
     start = value[curve, first]
-    end = start + change[curve, first + length] - change[curve, first]
+    end = start + rounds * change[curve, K] + change[curve, last] - change[curve, first]
     low = np.minimum(start, end)
-    return low, np.where(length == value.shape[1], low + 2 * np.pi, np.maximum(start, end))
+    return low, np.where(length == K, low + 2 * np.pi, np.maximum(start, end))
