@@ -176,3 +176,9 @@ def test_a_compiled_arm_traces_in_machine_code(monkeypatch: pytest.MonkeyPatch, 
     s = armkin.compile(arm).ik(target)
     assert not left
     np.testing.assert_array_equal(s.q, in_machine_code(arm, target, None).q)
+
+
+def test_where_curves_come_close_to_each_other_their_ways_are_followed_again_as_by_numpy() -> None:
+    target = armkin.fk(gen3(), random_postures(gen3(), 2469, 31))[[579, 1424, 1773, 2468]]
+    s = assert_as_by_numpy(gen3(), target, None)
+    assert s.within_limits.sum(axis=1)[1:].tolist() == [16, 24, 16]

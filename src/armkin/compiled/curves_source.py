@@ -82,6 +82,7 @@ def _settings(arm: Arm, joints: tuple[int, int, int], branches: int) -> str:
         "BRANCHES": branches,
         "PLANES": curve_starts.PLANES, "WAY_PARTS": curve_starts.WAY_PARTS, "NEWTON": curve_points.NEWTON,
         "HALVINGS": traced_curves.HALVINGS, "TRIES": traced_curves.TRIES, "ROUNDS": traced_curves.ROUNDS,
+        "TRACES": traced_curves.TRACES,
         "PARTS": traced_families.PARTS, "SECANTS": traced_families.SECANTS, "TURNS": traced_families.TURNS,
         "LAST": traced_families.LAST, "STEPS": traced_families.STEPS, "CROSSING_SECANTS": curve_starts.SECANTS,
         "CORRECTIONS": CORRECTIONS, "SWEEPS": SWEEPS,
@@ -90,7 +91,8 @@ def _settings(arm: Arm, joints: tuple[int, int, int], branches: int) -> str:
         "REACH_LENGTH": arm.reach, "SMALL_TURN": SMALL_TURN, "TINY": tol.TINY, "NEWTON_STEP": curve_points.MAX_STEP,
         "MID_MISS": tol.MID_MISS, "SAME_SEED": tol.SAME_SEED, "PAIR_STEP": tol.PAIR_STEP, "REACH": tol.REACH,
         "NEAR_DEFECT": tol.NEAR_DEFECT, "ACCEPTED_DEFECT": tol.ACCEPTED, "ARC_LENGTH": traced_curves.ARC_LENGTH,
-        "RAY_STEP": traced_curves.MAX_STEP, "SIDE_SHARE": traced_curves.SIDE_SHARE, "WAY": traced_families.WAY,
+        "RAY_STEP": traced_curves.MAX_STEP, "STEP_SHARE": traced_curves.STEP_SHARE, "TOUCHING": tol.TOUCHING_STEP,
+        "SIDE_SHARE": traced_curves.SIDE_SHARE, "WAY": traced_families.WAY,
         "SHORTEST_ARC": tol.SHORTEST_ARC, "ON_CURVE": curve_starts.ON_CURVE, "PROBE_SHARE": tol.PROBE_SHARE,
         "ROUNDING": tol.ROUNDING, "CONVERGING": tol.CONVERGING, "LEFT_OUT_VALUE": tol.LEFT_OUT_VALUE,
     }  # fmt: skip

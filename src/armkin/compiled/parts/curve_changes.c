@@ -90,10 +90,12 @@ static void arm_turn_back(const double *goal, const arm_ways *ways, const arm_ma
         arm_many step = arm_pick(bent, -slope / arm_pick(bent, bend, arm_all(1)), arm_all(0));
         arm_flags moved;
         step = arm_less(arm_larger(step, -ARM_REACH * size), ARM_REACH * size);
+        moved = (arm_flags)(arm_size(step) > ARM_PAIR_STEP); /* of a shorter one the bend would be rounding */
+        if (!arm_any(moved))
+            break;
         for (j = 0; j < ARM_JOINTS; j++)
-            end.q[j] += step * end.tangent[j];
+            end.q[j] += arm_pick(moved, step * end.tangent[j], arm_all(0));
         arm_onto_curves(goal, &end, ARM_PAIR_STEP, ARM_NEWTON, 0);
-        moved = (arm_flags)(step != 0);
         bend = arm_pick(moved, (end.tangent[ARM_REDUNDANT] - slope) / arm_pick(moved, step, arm_all(1)), bend);
     }
     memcpy(q, end.q, sizeof end.q);

@@ -184,7 +184,7 @@ static void arm_find_nearest(const arm_curves *f, arm_pieces *w)
         for (; i < ARM_MANY; i++)
             for (k = 0; k < ARM_JOINTS; k++)
                 points.tangent[k][i] = points.tangent[k][0];
-        arm_onto_curves(f->goal, &points, 0, ARM_LAST, 1);
+        arm_onto_curves(f->goal, &points, ARM_PAIR_STEP, ARM_LAST, 1);
         memcpy(best.q, points.q, sizeof best.q);
         arm_keep_best(w, &best);
     }

@@ -18,7 +18,7 @@ typedef struct {
     double posture[ARM_EXTRA][ARM_WIDTH]; /* answers, each of which has a plane */
     double q[ARM_NODES][ARM_WIDTH], tangent[ARM_NODES][ARM_WIDTH];
     int plane[ARM_NODES], partner[2 * ARM_NODES]; /* -1: on none; the half that each is joined to, -1: none yet */
-    uint8_t traced[2 * ARM_NODES];
+    uint8_t traces[2 * ARM_NODES]; /* of each half; ARM_TRACES where another one would be the same */
 } arm_curves;
 
 /* A posture that is near an answer: on which plane, as which branch. */
@@ -79,7 +79,7 @@ static int arm_add_node(arm_curves *f, const double *q, const double *tangent, i
     memcpy(f->tangent[m], tangent, ARM_WIDTH * sizeof *q);
     f->plane[m] = plane;
     f->partner[2 * m] = f->partner[2 * m + 1] = -1;
-    f->traced[2 * m] = f->traced[2 * m + 1] = 0;
+    f->traces[2 * m] = f->traces[2 * m + 1] = 0;
     return f->nodes++;
 }
 

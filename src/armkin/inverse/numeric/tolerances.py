@@ -103,6 +103,7 @@ EQUAL_COST = 1e-9  # relative difference of two costs that belong to one minimum
 PROBE_SHARE = 1e-6  # share of the way to a curve's next sample, at which it is asked whether the motion gets shorter
 SAME_SEED = 1e-4  # distance [rad, reaches] of the answer an arc ends at; residual of one worth a correction
 MID_MISS = 1e-4  # error [reaches, rad], at most, of the middle of a cubic that follows a curve of answers
+TOUCHING_STEP = 1e-3  # step [rad, reaches] along a curve, below which it passes a plane on which it is not found
 SHORTEST_ARC = 1e-6  # step [rad, reaches] along a curve of answers, below which the curve is given up
 LAST_STEP = 1e-9  # length [rad, reaches] of a step of the descent after which none is worth while
 SHORTENED_SHARE = 0.005  # shortest share of a step that is tried

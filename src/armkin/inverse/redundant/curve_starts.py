@@ -28,6 +28,7 @@ PLANES = 60  # values of the joint at which the target is solved
 WAY_PARTS = 12  # parts of the way between two planes, where answers may be that neither plane has
 VALUES = 0.05, 0.05 + np.pi / 2  # angles [rad] at which the other joint is held: the remaining ones are not special
 SECANTS = 4  # steps along a cubic to where the other joint has such a value
+GROUP_WIDTH = 64.0  # more than twice the largest key of a posture
 ON_CURVE = 0.02  # distance [rad, reaches] of an answer from a curve up to which it is on it
 
 
@@ -140,7 +141,7 @@ def first_of_equals(follower: Follower, group: Int, q: Array) -> Bool:
     """Which postures (M, n) of groups (M,) are the first of those that are the same."""
     # cos is even: without a shift q and -q would share a key; joints differ in weight so that angles do not swap unseen
     key = np.cos(q - 0.3) @ np.sqrt(np.arange(2.0, 2.0 + q.shape[1]))
-    order = np.lexsort((key, group))
+    order = np.argsort(group * GROUP_WIDTH + key)
     first, second = order[:-1], order[1:]
     similar = (group[first] == group[second]) & (np.abs(key[first] - key[second]) < 10 * tol.SAME_SEED)
     twin = np.flatnonzero(similar)

@@ -24,9 +24,11 @@ AT_ONCE = 8000  # pairs of answers that are joined at once: they stay in the cac
 HALVINGS = 6  # halvings of the way between two answers
 ARC_LENGTH = 6.0  # distance [rad, reaches], at most, of answers that one cubic joins
 MAX_STEP = 0.3  # longest step [rad, reaches] along a curve
+TRACES = 3  # traces, at most, of a half whose way contradicts another one
+STEP_SHARE = 0.25  # longest step of the next one of these, in that of the last
 SIDE_SHARE = 0.3  # distance, as a share of a step, that Newton's method moves a point sideways at most
 TRIES = 400  # steps, at most, of rays that follow on one another
-ROUNDS = 20  # traces, at most
+ROUNDS = 20  # traces of all halves, at most
 
 
 class _Rays(NamedTuple):
@@ -38,6 +40,7 @@ class _Rays(NamedTuple):
     middle: Array  # (R,) the joint of the planes in the middle of the slab [rad]
     half_width: Array  # (R,) [rad]
     step: Array  # (R,) length of the next step [rad, reaches]
+    longest: Array  # (R,) of any
     points: Points  # where they are
 
 
@@ -49,7 +52,7 @@ class _Curves:
         self.planes, self.nodes, self.grid = answers_on_planes(follower, owner, q)
         self.count = len(self.nodes.row)  # behind these there may be room for more
         self.partner = np.full(2 * self.count, -1)  # the half that each is joined to, -1: none yet
-        self.traced = np.zeros(len(self.partner), bool)  # a half whose ray was lost would lose it again
+        self.traces = np.zeros(len(self.partner), np.intp)  # of each half; `TRACES` where another one would be the same
         self.ends = np.arange(self.count)  # nodes on planes of which a half may be open
         self.later = np.zeros(0, np.intp)  # nodes on planes, but not on the grid
         next_plane = (np.arange(self.grid.shape[1]) + 1) % self.planes.counts[:, None]
@@ -68,7 +71,7 @@ class _Curves:
             self.nodes = stack_rows([self.nodes, self.nodes, nodes])
             added = 2 * len(self.nodes.row) - len(self.partner)
             self.partner = np.append(self.partner, np.full(added, -1))
-            self.traced = np.append(self.traced, np.zeros(added, bool))
+            self.traces = np.append(self.traces, np.zeros(added, np.intp))
         replace_rows(self.nodes, number, nodes)
         return number
 
@@ -139,15 +142,14 @@ class _Curves:
     def trace(self) -> None:
         """Open halves, step by step to the nodes that they come to."""
         half = self.open()
-        half, goal, passed = self._follow_rays(half[~self.traced[half]])
-        self.traced[half] = True
+        half, goal, passed = self._follow_rays(half[self.traces[half] < TRACES])
+        self.traces[half] = np.where((goal < 0) | (self.partner[goal] >= 0), TRACES, self.traces[half] + 1)
         every = np.arange(len(half))
         place = np.where(np.isin(goal, half), np.searchsorted(half, goal), len(half))
-        # an arc is traced from both of its ends: one of the two traces is kept
+        # an arc is traced from both of its ends: one of the two traces is kept, unless another one contradicts it
+        back, (_, index, count) = np.append(goal, -1)[place], np.unique(goal, return_inverse=True, return_counts=True)
         selected = (goal >= 0) & (self.partner[goal] < 0) & (every < place) & (goal != half)
-        selected &= np.isin(every, np.unique(goal, return_index=True)[1])
-        back = np.append(goal, -1)[place]  # to where the half leads that it comes to: of two ways one is wrong
-        selected &= (back < 0) | (back == half)
+        selected &= (count[index] == 1) & ((back < 0) | (back == half))
         rays, passed = np.flatnonzero(selected), rows_of(passed, selected[passed.number])
         added = self._add(Nodes(passed.row, np.full(len(passed.row), -1), passed.points))
         a = np.append(half[rays], 2 * added)[np.argsort(np.append(rays, passed.number), kind="stable")]
@@ -175,12 +177,16 @@ class _Curves:
 
     def _rays(self, half: Int) -> _Rays:
         """The rays of halves (M,), where they begin."""
-        row, slab = self.nodes.row[half >> 1], self.slab(half)
-        low, high = (self.planes.values[row, plane % self.planes.counts[row]] for plane in (slab, slab + 1))
-        half_width, step = 0.5 * np.remainder(high - low, 2 * np.pi), np.full(len(half), MAX_STEP)
-        points = self.nodes.leaving(half)
+        row, slab, points = self.nodes.row[half >> 1], self.slab(half), self.nodes.leaving(half)
+        longest = np.asarray(MAX_STEP * STEP_SHARE ** self.traces[half], float)
         points = onto_curves(self.follower, row, points.q, points.tangent)  # as near as short steps need
-        return _Rays(np.arange(len(half)), row, slab, low + half_width, half_width, step, points)
+        return _Rays(np.arange(len(half)), row, slab, *self._sizes(row, slab), longest, longest, points)
+
+    def _sizes(self, row: Int, slab: Int) -> tuple[Array, Array]:
+        """The middles of slabs (M,) of targets row (M,) and half their widths [rad]."""
+        low, high = (self.planes.values[row, plane % self.planes.counts[row]] for plane in (slab, slab + 1))
+        half_width = 0.5 * np.remainder(high - low, 2 * np.pi)
+        return low + half_width, half_width
 
     def _follow_rays(self, half: Int) -> tuple[Int, Int, _Rays]:
         """Halves (M,), step by step to where they leave their slabs, and from there, where no node was, on.
@@ -197,14 +203,16 @@ class _Curves:
                 crossing = self._cross_plane(rows_of(rays, leaves), rows_of(points, leaves))
                 origin = self.nodes.points.q[half[rays.number[leaves]] >> 1]
                 way = newton.wrapped_distance(self.follower.arm, crossing.points.q, origin)
-                valid[leaves] = found = (crossing.plane >= 0) & (way >= tol.SAME_SEED)  # else the step is too long
-                leaves &= valid
+                found = crossing.points.settled & (way >= tol.SAME_SEED)  # else the step is too long,
+                touches = ~found & (rays.step[leaves] < tol.TOUCHING_STEP)  # or the curve turns back beside the plane
+                self._pass_plane(rays, np.flatnonzero(leaves)[touches], crossing.plane[touches])
+                valid[leaves], leaves[leaves] = found | touches, found
                 arrived = 2 * self._on_plane(rows_of(crossing, found))
                 goal[rays.number[leaves]] = arrived + (crossing.plane[found] != rays.slab[leaves])
             continues = valid & ~leaves
             replace_rows(rays.points, continues, rows_of(points, continues))
             passed.append(rows_of(rays, continues))
-            rays = rays._replace(step=np.where(valid, np.minimum(1.5 * rays.step, MAX_STEP), 0.5 * rays.step))
+            rays = rays._replace(step=np.where(valid, np.minimum(1.5 * rays.step, rays.longest), 0.5 * rays.step))
             rays = rows_of(rays, ~leaves & (rays.step > tol.SHORTEST_ARC))
             onward = np.setdiff1d(np.arange(2 * count, 2 * self.count), goal)
             if len(onward):
@@ -225,6 +233,12 @@ class _Curves:
         is_close = points.settled & (drift < SIDE_SHARE * rays.step)
         return points, is_close & arcs.follow(follower, rays.row)
 
+    def _pass_plane(self, rays: _Rays, index: Int, plane: Int) -> None:
+        """Rays of some index (M,) come through planes (M,) into the slabs beyond."""
+        row, slab = rays.row[index], rays.slab[index]
+        rays.slab[index] = beyond = (slab + np.where(plane == slab, -1, 1)) % self.planes.counts[row]
+        rays.middle[index], rays.half_width[index] = self._sizes(row, beyond)
+
     def _leave_slab(self, rays: _Rays, points: Points) -> Bool:
         """Which rays (R,) leave their slabs by a step to points."""
         joint = self.planes.guide.joint
@@ -232,7 +246,7 @@ class _Curves:
         return np.asarray((np.abs(depth) >= rays.half_width) & (np.abs(depth - begin_depth) > tol.TINY))
 
     def _cross_plane(self, rays: _Rays, points: Points) -> Nodes:
-        """Where rays (R,) that leave their slabs by a step to points cross a plane; -1: that posture is not found."""
+        """Where rays (R,) that leave their slabs by a step to points cross a plane, if that posture is settled."""
         begin, arm, joint = rays.points, self.follower.arm, self.planes.guide.joint
         depth, begin_depth = (wrap_angle(end.q[:, joint] - rays.middle) for end in (points, begin))
         goal = np.where(depth > 0, rays.half_width, -rays.half_width)
@@ -240,8 +254,7 @@ class _Curves:
         guess = begin.q + share[:, None] * newton.difference(arm, points.q, begin.q) * radian_or_reach(arm)
         guess[:, joint] = rays.middle + goal
         crossing = onto_curves(self.follower, rays.row, guess, self.planes.held(len(guess)))
-        plane = (rays.slab + (depth > 0)) % self.planes.counts[rays.row]
-        return Nodes(rays.row, np.where(crossing.settled, plane, -1), crossing)
+        return Nodes(rays.row, (rays.slab + (depth > 0)) % self.planes.counts[rays.row], crossing)
 
 
 class Chains(NamedTuple):
@@ -286,7 +299,7 @@ def _join_curves(follower: Follower, owner: Int, q: Array) -> Chains:
     curves = _Curves(follower, owner, q)
     for _ in range(ROUNDS):
         curves.join_pairs()
-        if curves.traced[curves.open()].all():
+        if (curves.traces[curves.open()] >= TRACES).all():
             break
         curves.trace()
     return _chain_halves(curves)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from armkin.formula.array_tuples import rows_of
+from armkin.formula.array_tuples import replace_rows, rows_of
 from armkin.formula.arrays import Array, Bool, Int, wrap_angle
 from armkin.inverse.branches.whole_turns import nearest_row
 from armkin.inverse.numeric import newton
@@ -24,8 +24,8 @@ AT_ONCE = 128  # targets whose points are worked on together
 PARTS = 4  # parts of the way between two points, at whose ends limits and the joint's sense are asked
 SECANTS = 10  # steps along a cubic to where a limit is crossed or the joint turns back
 WAY = 0.1  # share of the way, to both sides, at which a cubic's slope tells how the joint turns back, as a parabola
-TURNS = 3  # steps along the curve to where the joint turns back
-LAST = 2  # last steps, which take away what is left of a posture's residual
+TURNS = 5  # steps along the curve to where the joint turns back
+LAST = 100  # last steps, at most, which take away what is left of a posture's residual
 STEPS = 12  # steps of the golden section
 
 
@@ -86,13 +86,17 @@ class Traced(NamedTuple):
 
     def without_residual(self, pieces: Pieces, q: Array) -> Array:
         """Postures (P, n) of pieces, moved onto their targets from where `at` leaves them, by steps of least norm."""
-        follower, q = self.follower, q.copy()
+        follower, q, active = self.follower, q.copy(), np.arange(len(q))
         for _ in range(LAST):
+            if not len(active):
+                break
             residual, J = newton.scaled_residual_and_jacobian(
-                follower.arm, follower.redundant.task, q, follower.target[pieces.row]
+                follower.arm, follower.redundant.task, q[active], follower.target[pieces.row[active]]
             )
             weight = nudged(np.linalg.solve, J @ J.transpose(0, 2, 1), residual[:, :, None])
-            q += (J.transpose(0, 2, 1) @ weight)[:, :, 0] * radian_or_reach(follower.arm)
+            step = (J.transpose(0, 2, 1) @ weight)[:, :, 0]
+            q[active] += step * radian_or_reach(follower.arm)
+            active = active[np.abs(step).max(axis=1) >= tol.PAIR_STEP]
         return q
 
     def _between(self, point: Int, share: Array, tolerance: float = tol.PAIR_STEP) -> Points:
@@ -158,13 +162,16 @@ class Traced(NamedTuple):
         end = self._between(point, share)
         size = np.maximum(np.sqrt((arcs.begin**2).sum(axis=1)), tol.TINY)
         bend = (arcs.slope(share + WAY, j) - arcs.slope(share - WAY, j)) / (2.0 * WAY * np.maximum(size**2, tol.TINY))
-        for _ in range(TURNS if len(point) else 0):
+        for _ in range(TURNS):
             step = -end.tangent[:, j] / np.where(np.abs(bend) > tol.TINY, bend, np.inf)
             step = np.clip(step, -tol.REACH * size, tol.REACH * size)
+            rows = np.flatnonzero(np.abs(step) > tol.PAIR_STEP)  # of a shorter one the bend would be rounding
+            if not len(rows):
+                break
             predicted = end.q + step[:, None] * end.tangent * radian_or_reach(self.follower.arm)
-            point1 = onto_curves(self.follower, self.row[point], predicted, end.tangent)
-            bend = np.where(step == 0.0, bend, (point1.tangent - end.tangent)[:, j] / np.where(step == 0.0, 1.0, step))
-            end = point1
+            moved = onto_curves(self.follower, self.row[point[rows]], predicted[rows], end.tangent[rows])
+            bend[rows] = (moved.tangent - end.tangent[rows])[:, j] / step[rows]
+            replace_rows(end, rows, moved)
         return share, end.q
 
 
