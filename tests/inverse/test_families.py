@@ -7,6 +7,7 @@ from redundant_arms import covers_value, held_answers, redundant_postures
 import armkin
 from armkin import Status
 from armkin.inverse.branches.whole_turns import nearest_row
+from armkin.inverse.redundant import boundaries
 from armkin.inverse.redundant.other_joints import Follower
 from armkin.inverse.solve import ik
 from armkin.inverse.solvers.choose_redundant_joint import redundancy
@@ -333,6 +334,26 @@ def test_an_end_before_its_best_sample_by_rounding_is_no_whole_turn() -> None:
     assert (np.ptp(s.interval[s.within_limits], axis=1) < 5.8).all()
 
 
+@pytest.mark.parametrize("more", [False, True])
+@pytest.mark.parametrize("number", [3233, 5745, 16984])
+def test_an_end_that_rounding_moves_is_found_in_more_digits(
+    number: int, more: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """panda: one end each of 9 of 40,000 targets was 8e-5 to 1e-3 degrees off, with `complete` true."""
+    arm, more = armkin.load("panda"), more and boundaries.MORE_DIGITS
+    monkeypatch.setattr(boundaries, "MORE_DIGITS", more)
+    target = redundant_postures(arm, None, number + 1, 31)[1][-1]
+    s = armkin.ik(arm, target)
+    assert s.complete == more
+    assert s.interval is not None
+    legal = s.interval[s.within_limits]
+    for end in np.unique(legal.ravel().round(9)):
+        for value in (end - 2e-8, end + 2e-8):
+            if abs(value) < arm.upper[6]:
+                own = held_answers(arm, 6, float(value), target, None)
+                assert covers_value(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
+
+
 @pytest.mark.parametrize(
     "degrees",
     [
@@ -340,7 +361,7 @@ def test_an_end_before_its_best_sample_by_rounding_is_no_whole_turn() -> None:
             [0, -180, -90, 0, 0, 0, -180],
             [-180, -135, -180, 60, 15, 60, -90],
         ),  # where something may change is not known
-        *([-45, 135, -135, 30, 90, 135, 15], [-30, -60, 135, 120, -90, -135, 165]),  # or does not explain a change
+        [-30, -60, 135, 120, -90, -135, 165],  # or does not explain a change
     ],
 )
 def test_a_target_whose_changes_nobody_explains_is_sampled_alone_as_in_a_batch(degrees: list[int]) -> None:

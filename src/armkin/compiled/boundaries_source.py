@@ -18,10 +18,8 @@ from armkin.formula.arrays import Entry
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant import turn_roots
-from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
+from armkin.inverse.redundant.boundaries import DEGREE, MOVED_ROOT, Boundaries, equations
 
-MOVED_ROOT = 1e-8  # way [rad] of a root by the bound of its rounding, above which more digits are used
-INPUT_SHARE = 0.1  # share of rounding that the target's own numbers have, however many digits are used
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
 FUNCTIONS = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")  # of C's library
 
@@ -128,7 +126,7 @@ def roots_fields(bounds: Boundaries) -> dict[str, str]:
     recorded, known = record_equations(bounds), lengths(bounds)
     single = {"real": "double", "suffix": "", "angles": "ARM_ANGLES", "rounding": number_text(tol.ROUNDING)}
     wide = {"real": "long double", "suffix": "_wide", "angles": "ARM_SAMPLED"}
-    wide["rounding"] = f"fmaxl({INPUT_SHARE}, LDBL_EPSILON / DBL_EPSILON) * {number_text(tol.ROUNDING)}"
+    wide["rounding"] = f"fmaxl({turn_roots.INPUT_SHARE}, LDBL_EPSILON / DBL_EPSILON) * {number_text(tol.ROUNDING)}"
     return {
         "roots": _roots_code(recorded, known, single, ""),
         "roots_wide": _roots_code(recorded, known, wide, "l"),

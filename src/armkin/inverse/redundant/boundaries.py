@@ -17,12 +17,14 @@ from numpy.typing import NDArray
 from armkin.formula.arrays import Array, Bool, numbers_within
 from armkin.inverse.closed.wrist import meeting_point, perpendicular_foot
 from armkin.inverse.numeric import tolerances as tol
-from armkin.inverse.redundant.turn_roots import roots, sampled_at
+from armkin.inverse.redundant.turn_roots import Real, Roots, roots, sampled_at
 from armkin.model.arm import Arm
 from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about, shrink_translations
 
 DEGREE = 8  # degree of the polynomial whose roots are the boundaries
+MOVED_ROOT = 1e-8  # way [rad] of a root by the bound of its rounding, above which more digits are used
+MORE_DIGITS = bool(np.finfo(np.longdouble).eps < np.finfo(float).eps)  # whether this computer has any
 Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 Complex = NDArray[np.complex128]
 
@@ -195,14 +197,29 @@ def equations(bounds: Boundaries, rotation: Array, shoulder: Array, t: Complex) 
     return np.stack(values)
 
 
+def _zeros(bounds: Boundaries, target: Array, real: Real, most: float) -> Roots:
+    """Roots of all polynomials, of which of targets (S, 4, 4) each is, in numbers of a kind; most: as of `roots`."""
+    rotation, shoulder = (x.astype(real) for x in from_joint7(bounds, target))
+    # a rotation to the last digit
+    rotation = np.asarray(rotation @ (3 * np.eye(3) - rotation.transpose(0, 2, 1) @ rotation) / 2)
+    names = "link", "shoulder", "upper", "fore", "wrist"
+    bounds = bounds._replace(**{name: getattr(bounds, name).astype(real) for name in names})
+    values = equations(bounds, rotation, shoulder, sampled_at(DEGREE, real))
+    F, S, M = values.shape
+    found = roots(values.reshape(-1, M), DEGREE, most)
+    return Roots(found.which % max(S, 1), found.at, np.asarray(found.decided.reshape(F, S).all(axis=0)))
+
+
 def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf past the last; whether that is all (S,)."""
-    values = equations(bounds, *from_joint7(bounds, target), sampled_at(DEGREE))
-    F, S, M = values.shape
-    zeros = roots(values.reshape(-1, M), DEGREE)
+    S, zeros = len(target), _zeros(bounds, target, np.float64, MOVED_ROOT)
+    rows = np.flatnonzero(~zeros.decided & MORE_DIGITS)
+    exact = _zeros(bounds, target[rows], np.longdouble, np.inf)
+    is_kept = zeros.decided[zeros.which]
     limits = np.array(_limits_of_joint(bounds.arm, 6))
-    row = np.concatenate([zeros.which % S, np.repeat(np.arange(S), len(limits))])
-    angles = np.concatenate([zeros.at, np.tile(limits, S)])
+    row = np.concatenate([zeros.which[is_kept], rows[exact.which], np.repeat(np.arange(S), len(limits))])
+    angles = np.concatenate([zeros.at[is_kept], exact.at, np.tile(limits, S)])
+    zeros.decided[rows] = exact.decided
     angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
     order = np.lexsort((angles, row))
     row, angles = row[order], angles[order]
@@ -211,7 +228,7 @@ def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     count = np.bincount(row, minlength=S)
     table = np.full((S, int(count.max(initial=0))), np.inf)
     table[row, numbers_within(count)] = angles
-    return table, np.asarray(zeros.decided.reshape(F, S).all(axis=0))
+    return table, zeros.decided
 
 
 def on_both_sides(angles: Array) -> Array:
