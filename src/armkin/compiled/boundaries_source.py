@@ -18,7 +18,7 @@ from armkin.formula.arrays import Entry
 from armkin.formula.c_and_js_code import number_text
 from armkin.inverse.numeric import tolerances as tol
 from armkin.inverse.redundant import turn_roots
-from armkin.inverse.redundant.boundaries import DEGREE, MOVED_ROOT, Boundaries, equations
+from armkin.inverse.redundant.boundaries import DEGREE, Boundaries, equations
 
 INPUTS = 12  # numbers of a target's rotation and of where it has the shoulder
 FUNCTIONS = ("atan", "cos", "sin", "cosh", "sinh", "exp", "sqrt", "fabs", "fmax")  # of C's library
@@ -138,7 +138,7 @@ def roots_fields(bounds: Boundaries) -> dict[str, str]:
         "halvings": str(turn_roots.HALVINGS),
         "newton": str(turn_roots.STEPS),
         "safe": number_text(turn_roots.SAFE),
-        "moved_root": number_text(MOVED_ROOT),
+        "moved_root": number_text(tol.MOVED_ROOT),
     }
 
 

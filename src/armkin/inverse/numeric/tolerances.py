@@ -69,6 +69,7 @@ BESIDE_SPECIAL = 0.01  # defect [rad, scaled length] of axes 6 and 1, parallel o
 GRAZING = 3e-9  # defect, as BESIDE_SPECIAL, where two roots all but meet: about 1e-9 of the reach
 APART_ROOTS = 1e-3  # distance [rad, reaches] from which on roots that seeds lead to are surely two
 PAIR_WAY = 1e-4  # half distance [rad, reaches] of two roots below which differences over it would be noise
+MOVED_ROOT = 1e-8  # way [rad] that rounding may move a polynomial's root at most, before it is asked in more digits
 PAIR_STEP = 1e-8  # last step [rad, reaches] of two roots that are found together: its square is rounding
 NO_DETERMINANT = 1e-30  # square of a determinant [reaches a radian] that no step is divided by
 LAST_ERROR = 1e-13  # residual up to which Newton's last step is the last

@@ -23,7 +23,6 @@ from armkin.model.joint_chain import is_parallel
 from armkin.model.rotation import inverse, rotation_about, shrink_translations
 
 DEGREE = 8  # degree of the polynomial whose roots are the boundaries
-MOVED_ROOT = 1e-8  # way [rad] of a root by the bound of its rounding, above which more digits are used
 MORE_DIGITS = bool(np.finfo(np.longdouble).eps < np.finfo(float).eps)  # whether this computer has any
 Z = np.array([0.0, 0.0, 1.0])  # the base's z axis
 Complex = NDArray[np.complex128]
@@ -212,7 +211,7 @@ def _zeros(bounds: Boundaries, target: Array, real: Real, most: float) -> Roots:
 
 def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf past the last; whether that is all (S,)."""
-    S, zeros = len(target), _zeros(bounds, target, np.float64, MOVED_ROOT)
+    S, zeros = len(target), _zeros(bounds, target, np.float64, tol.MOVED_ROOT)
     rows = np.flatnonzero(~zeros.decided & MORE_DIGITS)
     exact = _zeros(bounds, target[rows], np.longdouble, np.inf)
     is_kept = zeros.decided[zeros.which]
