@@ -36,23 +36,21 @@ class Points(NamedTuple):
         return np.asarray(self.step < tol.PAIR_STEP)
 
 
-def onto_curves(
-    follower: Follower, row: Int, q: Array, last: Array, tolerance: float = tol.PAIR_STEP, steps: int = NEWTON
-) -> Points:
+def onto_curves(follower: Follower, row: Int, q: Array, last: Array, tolerance: float = tol.PAIR_STEP) -> Points:
     """Postures q (M, n) moved onto the curves of their targets, across last (M, n): a tangent, or a joint that is held.
 
     The tangents point to where last does. tolerance: size of a step that is the last one.
     """
     parts = slices(max(len(q), 1), AT_ONCE)
-    return stack_rows([_move_chunk(follower, row[part], q[part], last[part], tolerance, steps) for part in parts])
+    return stack_rows([_move_chunk(follower, row[part], q[part], last[part], tolerance) for part in parts])
 
 
-def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float, steps: int) -> Points:
+def _move_chunk(follower: Follower, row: Int, q: Array, last: Array, tolerance: float) -> Points:
     """Move at most `AT_ONCE` postures q (M, n) [rad | mm], which the cache holds, onto curves as `onto_curves` does."""
     unit, target = radian_or_reach(follower.arm), follower.target[row]
     q, tangent = q.copy(), last.copy()
     size, active = np.full(len(q), np.inf), np.arange(len(q))
-    for _ in range(steps):
+    for _ in range(NEWTON):
         if not len(active):
             break
         part = slice(None) if len(active) == len(q) else active
