@@ -45,3 +45,13 @@ def covers_value(arm: armkin.Arm, intervals: np.ndarray, value: float | np.ndarr
     """Which intervals (B, 2) hold a value, modulo whole turns."""
     middle, half = intervals.mean(axis=-1), np.ptp(intervals, axis=-1) / 2
     return np.asarray(np.abs(np.remainder(value - middle + np.pi, 2 * np.pi) - np.pi) <= half + slack)
+
+
+def assert_ends(arm: armkin.Arm, intervals: np.ndarray, joint: int, target: np.ndarray) -> None:
+    """Beside each end of intervals (B, 2), 2e-8 rad from it, as many hold the value as the arm with the joint held has
+    legal postures."""
+    for end in np.unique(intervals.ravel().round(9)):
+        for value in (float(end) - 2e-8, float(end) + 2e-8):
+            if arm.lower[joint] < value < arm.upper[joint]:
+                own = held_answers(arm, joint, value, target, None)
+                assert covers_value(arm, intervals, value, 0.0).sum() == len(own), np.rad2deg(value)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from redundant_arms import covers_value, held_answers, redundant_postures
+from redundant_arms import assert_ends, covers_value, held_answers, redundant_postures
 
 import armkin
 from armkin import Status
@@ -151,11 +151,7 @@ def test_an_interval_ends_where_its_joint_turns_back_most_sharply() -> None:
     target = redundant_postures(arm, None, 1167, 5)[1][-1]
     s = armkin.ik(arm, target)
     assert s.interval is not None
-    legal = s.interval[s.within_limits]
-    for end in np.unique(legal.ravel().round(9)):
-        for value in (end - 2e-8, end + 2e-8):
-            own = held_answers(arm, 6, float(value), target, None)
-            assert covers_value(arm, legal, float(value), 0.0).sum() == len(own), np.rad2deg(value)
+    assert_ends(arm, s.interval[s.within_limits], 6, target)
 
 
 @pytest.mark.parametrize("posture", [[163.286, 26.081, 8.565, 0.38, 49.929, -10.184, -13.013],

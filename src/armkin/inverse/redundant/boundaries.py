@@ -206,19 +206,19 @@ def _zeros(bounds: Boundaries, target: Array, real: Real, most: float) -> Roots:
     values = equations(bounds, rotation, shoulder, sampled_at(DEGREE, real))
     F, S, M = values.shape
     found = roots(values.reshape(-1, M), DEGREE, most)
-    return Roots(found.which % max(S, 1), found.at, np.asarray(found.decided.reshape(F, S).all(axis=0)))
+    return Roots(found.which % S, found.at, np.asarray(found.decided.reshape(F, S).all(axis=0)))
 
 
 def boundary_angles(bounds: Boundaries, target: Array) -> tuple[Array, Bool]:
     """Where something may change at targets (S, 4, 4): (S, V), sorted, inf past the last; whether that is all (S,)."""
     S, zeros = len(target), _zeros(bounds, target, np.float64, tol.MOVED_ROOT)
-    rows = np.flatnonzero(~zeros.decided & MORE_DIGITS)
-    exact = _zeros(bounds, target[rows], np.longdouble, np.inf)
-    is_kept = zeros.decided[zeros.which]
-    limits = np.array(_limits_of_joint(bounds.arm, 6))
-    row = np.concatenate([zeros.which[is_kept], rows[exact.which], np.repeat(np.arange(S), len(limits))])
-    angles = np.concatenate([zeros.at[is_kept], exact.at, np.tile(limits, S)])
-    zeros.decided[rows] = exact.decided
+    is_kept, limits = zeros.decided[zeros.which], np.array(_limits_of_joint(bounds.arm, 6))
+    found = [(zeros.which[is_kept], zeros.at[is_kept]), (np.repeat(np.arange(S), len(limits)), np.tile(limits, S))]
+    if MORE_DIGITS and len(rows := np.flatnonzero(~zeros.decided)):
+        exact = _zeros(bounds, target[rows], np.longdouble, np.inf)
+        found.append((rows[exact.which], exact.at))
+        zeros.decided[rows] = exact.decided
+    row, angles = (np.concatenate(column) for column in zip(*found, strict=True))
     angles = np.remainder(angles + np.pi, 2 * np.pi) - np.pi
     order = np.lexsort((angles, row))
     row, angles = row[order], angles[order]

@@ -39,7 +39,7 @@ from armkin.model.limits import outside_limits
 AT_ONCE = 96_000  # targets of the other joints solved together
 CIRCLES = 256  # targets whose arm angles are worked on together
 TRACED = 1000  # targets whose curves are traced together
-LAST = 300  # steps, at most, of what a search has found: of 45 postures near an arm's reach 60 steps end one, 200 ten
+SEARCH_STEPS = 300  # steps, at most, onto what a search is near: of 45 such postures 60 steps end one, 200 ten
 FREE_STEP = np.deg2rad(0.1)  # step [rad] of the parameter between postures that are asked whether they are free
 
 # The answers of some targets N, as curves with a parameter: all their `pieces`; whether no curve can be missing,
@@ -198,7 +198,7 @@ class _Rows:
             if not self.stands[k]:
                 q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
                 q = q[~np.isnan(q[:, 0])]
-                q, miss = newton.correct(self.arm, task, q, np.repeat(goal, len(q), axis=0), LAST)
+                q, miss = newton.correct(self.arm, task, q, np.repeat(goal, len(q), axis=0), SEARCH_STEPS)
                 q = q[miss <= tol.SOLUTION]
             if len(q):
                 q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))

@@ -214,8 +214,7 @@ class _Curves:
             passed.append(rows_of(rays, continues))
             rays = rays._replace(step=np.where(valid, np.minimum(1.5 * rays.step, rays.longest), 0.5 * rays.step))
             rays = rows_of(rays, ~leaves & (rays.step > tol.SHORTEST_ARC))
-            onward = np.setdiff1d(np.arange(2 * count, 2 * self.count), goal)
-            if len(onward):
+            if self.count > count and len(onward := np.setdiff1d(np.arange(2 * count, 2 * self.count), goal)):
                 number = np.arange(len(half), len(half) + len(onward))
                 half, goal = np.append(half, onward), np.append(goal, np.full(len(onward), -1))
                 rays = stack_rows([rays, self._rays(onward)._replace(number=number)])
