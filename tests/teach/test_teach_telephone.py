@@ -54,10 +54,11 @@ def test_a_telephone_s_window(browser: Browser) -> None:
         assert page.locator("#motors tbody td:nth-child(2)").all_inner_texts() == list(map(str, COUNTS))
         # A finger that swipes over a slider scrolls, and turns no joint; one that goes along it does.
         slider = page.locator("#sliders input[type=range]").nth(1)
-        slider.scroll_into_view_if_needed()
-        page.evaluate(_AT_REST)
         line = page.context.new_cdp_session(page)
         for across, down, turns in ((1, -12, False), (8, 1, True)):
+            # A quick swipe throws the page so far that the slider is out of sight, or below what stays in sight.
+            slider.evaluate("one => one.scrollIntoView({ block: 'center' })")
+            page.evaluate(_AT_REST)
             rect = slider.bounding_box()
             assert rect is not None
             x, y = rect["x"] + 0.3 * rect["width"], rect["y"] + rect["height"] / 2
