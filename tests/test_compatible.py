@@ -26,7 +26,7 @@ def test_every_public_name() -> None:
 @pytest.mark.parametrize("command", BEFORE["options"])
 def test_every_option(command: str) -> None:
     known = {name for p in load_command(command).params for name in (*p.opts, *p.secondary_opts)} | {"--help"}
-    assert {options_first([option], [])[0] for option in BEFORE["options"][command]} <= known
+    assert {options_first([option], known)[0] for option in BEFORE["options"][command]} <= known
 
 
 @pytest.mark.parametrize("words", BEFORE["json"])

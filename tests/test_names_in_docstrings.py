@@ -14,7 +14,15 @@ from source_trees import MODULES, SOURCE, tree_nodes
 
 DOCUMENTED = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 OTHERS = {"calc_junction", "cut", "gcode.c", "report.c", "finally", "nohup"}  # Klipper's, GRBL's, Python's, the shell's
-WRITTEN = {"arm.c", "arm_first_pass", "arm_least", "tool_x_mm", "up_axis", "x_mm"}  # of files that are written, or read
+WRITTEN = {
+    "arm.c",
+    "arm_first_pass",
+    "arm_least",
+    "joint_x",
+    "tool_x_mm",
+    "up_axis",
+    "x_mm",
+}  # of files that are written, or read
 ELSEWHERE = {"config", "fit_corrections", "read_robot_file"}  # a field of INFO, and functions of modules not imported
 
 

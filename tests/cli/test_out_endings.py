@@ -11,15 +11,13 @@ from command_line import run
 
 POSES = b"1,2,3\n4,5,6\n"
 DATA = ".npz, .parquet, .jsonl or .csv"
+BATCHES = ("fk", "ik", "pulses")
 TEXT = ".txt or .json"
 ROBOT = ".yaml or .yml"
 ASKED: dict[str, tuple[list[Any], str]] = {
     "fk": (["fk", "three_dof", 1, 2, 3], TEXT),
-    "fk of many": (["fk", "three_dof", "--batch", "-"], DATA),
     "ik": (["ik", "three_dof", 390, 80, 300], TEXT),
-    "ik of many": (["ik", "three_dof", "--batch", "-"], DATA),
     "pulses": (["pulses", "three_dof", 1, 2, 3], TEXT),
-    "pulses of many": (["pulses", "three_dof", "--batch", "-"], DATA),
     "info": (["info", "three_dof"], TEXT),
     "robots": (["robots"], TEXT),
     "schema": (["schema"], ".json"),
@@ -58,7 +56,7 @@ def test_an_unknown_ending_is_refused_with_those_allowed(tmp_path: Path, command
 
 
 @pytest.mark.parametrize("name", ["x.csv.npz", "x.parquet.CSV", "x.csv.csv"])
-@pytest.mark.parametrize("command", ["fk of many", "ik of many", "pulses of many", "workspace", "reach", "place"])
+@pytest.mark.parametrize("command", ["workspace", "reach", "place"])
 def test_two_endings_are_refused(tmp_path: Path, command: str, name: str) -> None:
     words, _ = ASKED[command]
     (tmp_path / "poses.csv").write_bytes(POSES)
@@ -69,12 +67,26 @@ def test_two_endings_are_refused(tmp_path: Path, command: str, name: str) -> Non
     assert not (tmp_path / name).exists()
 
 
-def test_json_is_not_written_as_csv(tmp_path: Path) -> None:
-    completed = run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / "x.csv", stdin=POSES)
-    assert completed.code == 2
-    assert "--json" in completed.err
-    for name in ("x.jsonl", "x"):
-        assert run("fk", "three_dof", "--batch", "-", "--json", "--out", tmp_path / name, stdin=POSES) == (0, "", "")
+@pytest.mark.parametrize("name", ["x.txt", "x.parquet.gz", "x.dat", "x.npz.csv"])
+@pytest.mark.parametrize("command", BATCHES)
+def test_a_batch_with_any_other_ending_is_csv_and_says_so(tmp_path: Path, command: str, name: str) -> None:
+    printed = run(command, "three_dof", "--batch", "-", stdin=b"250,20,150\n")
+    completed = run(command, "three_dof", "--batch", "-", "--out", tmp_path / name, stdin=b"250,20,150\n")
+    assert (completed.code, completed.out) == (printed.code, "")
+    assert ("rows are written as CSV" in completed.err) is not name.endswith(".csv")
+    assert (tmp_path / name).read_text() == printed.out
+
+
+@pytest.mark.parametrize("command", BATCHES)
+def test_json_of_a_batch_is_text_whatever_its_ending(tmp_path: Path, command: str) -> None:
+    words = (command, "three_dof", "--batch", "-", "--json")
+    printed = run(*words, stdin=b"250,20,150\n")
+    for name in ("x.jsonl", "x", "x.csv", "x.json"):
+        assert run(*words, "--out", tmp_path / name, stdin=b"250,20,150\n").code == printed.code
+        assert (tmp_path / name).read_text() == printed.out
+    for name in ("x.npz", "x.parquet"):
+        assert run(*words, "--out", tmp_path / name, stdin=b"250,20,150\n").code == 2
+        assert not (tmp_path / name).exists()
 
 
 def test_names_with_dots_and_without_an_ending_are_taken(tmp_path: Path) -> None:

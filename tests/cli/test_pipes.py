@@ -45,7 +45,7 @@ def test_json_lines_are_a_batch_and_unsolved_answers_are_skipped() -> None:
         (("fk", THREE_DOF), b"", 2, "three_dof takes 3 numbers"),
         (("fk", THREE_DOF), b"1,2,3\n", 2, "for rows of CSV add --batch -"),
         (("fk",), b"1,2,3\n", 2, "no JSON: give --json"),
-        (("pulses",), b"{}", 2, "names no robot_file"),
+        (("pulses",), b"{}", 2, "it has no robot_file"),
         (("fk", "ur5e"), ANSWER, 1, "is of three_dof, and the command is for ur5e"),
         (("fk", THREE_DOF), ANSWER.replace(b'_sha256": "', b'_sha256": "0'), 1, "computed with another"),
         (("fk", "--batch", "-"), b"1,2,3\n", 2, "missing argument 'ROBOT'"),

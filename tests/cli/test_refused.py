@@ -212,3 +212,63 @@ def test_counts_of_one_are_said_so(tmp_path: Path) -> None:
         "does not fit the 2 joints that are not held; hold fewer joints"
         in run("ik", THREE_DOF, 390, 80, 300, "--lock", "q1=5").err
     )
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("moves: [{wait: -1}]", "move 1: wait: must be at least 0, not -1"),
+        ("moves: [{wait: abc}]", "move 1: wait: is the text 'abc'; for example wait: 0.5"),
+        ("moves: [{grip: half}]", "move 1: grip: is the text 'half'; for example grip: closed"),
+        (f"corners: round\n{LINE}", "corners: is the text 'round'; for example corners: stop, corners: blend or"),
+        (f"robot: 5\n{LINE}", "robot: is 5; for example robot: three_dof"),
+        ("start: [0, 90, -90]\nmoves: [{wait: 1}]", "start: is a list; for example start: home, start: {joints:"),
+        ("start: {}\nmoves: [{wait: 1}]", "start: give joints: or point:, one of them"),
+        ("start: {joints: home, point: [390, 80, 300]}\nmoves: [{wait: 1}]", "start: give joints: or point:, one of"),
+    ],
+)
+def test_a_wrong_value_in_a_path_is_told_in_the_file_s_own_words(text: str, says: str) -> None:
+    completed = run("path", DOF, "-", stdin=text.encode())
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
+    assert "input should" not in completed.err
+
+
+@pytest.mark.parametrize(
+    ("words", "stdin", "says"),
+    [
+        (("home", DOF, "--port", "sim", "--assume-home"), b"", "no such option: --assume-home"),
+        (("fk", DOF, 1, 2, 3, "--assume-home"), b"", "no such option: --assume-home"),
+        (
+            ("fk", DOF, "--batch", "-"),
+            b'0,90,"-90\n1,2,3\n',
+            "row 1: this is no CSV of numbers: its quotes do not match",
+        ),
+        (("fk", DOF, "--batch", "-"), b"q1,q2,q3\n", "has no row with values"),
+        (("import", "-"), b"", "is empty"),
+        (("ik", "iiwa7", 400, 0, 500, 180, 0, 0, "--sweep", "J3=-10:10:3"), b"", "with J3 free the nearest pose"),
+    ],
+)
+def test_the_message_is_of_what_was_typed(words: tuple[Any, ...], stdin: bytes, says: str) -> None:
+    completed = run(*words, stdin=stdin)
+    assert (completed.code in (1, 2, 3, 4), completed.err.count("\n") <= 3) == (True, True)
+    assert says in completed.err
+
+
+@pytest.mark.parametrize(
+    ("row", "says"),
+    [
+        ('{"q1": 1, "q2": 2, "q3": 3, "q1": 9}', "row 1: it has q1 twice"),
+        ('{"q1": 1, "q2": 2, "q3": NaN}', "row 1: q3: nan is not finite"),
+        ('{"q1": 1, "q2": -Infinity, "q3": 3}', "row 1: q2: -inf is not finite"),
+        ("[1, 2, 3]", "row 1: this is no JSON object"),
+    ],
+)
+def test_a_row_of_json_lines_is_as_strict_as_one_of_csv(row: str, says: str, tmp_path: Path) -> None:
+    file = tmp_path / "rows.jsonl"
+    file.write_text(f"{row}\n")
+    completed = run("fk", DOF, "--batch", file)
+    assert (completed.code, completed.out) == (2, "")
+    assert says in completed.err
+    file.write_bytes(b'\xef\xbb\xbf{"q1": 1, "q2": 2, "q3": 3}\n')
+    assert run("fk", DOF, "--batch", file).code == 0

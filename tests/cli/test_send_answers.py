@@ -101,8 +101,8 @@ def test_a_changed_robot_file_is_noticed(tmp_path: Path) -> None:
     [
         (b"", "standard input is empty"),
         (b"q1 = 5\n", "no JSON"),
-        (b"[1, 2]", "names no robot_file"),
-        (b'{"robot_file": "robots/three_dof.yaml", "robot_sha256": 5, "joints": [1, 2, 3]}', "names no robot_file"),
+        (b"[1, 2]", "it has no robot_file"),
+        (b'{"robot_file": "robots/three_dof.yaml", "robot_sha256": 5, "joints": [1, 2, 3]}', "it has no robot_sha256"),
         (b"\xff\xfe{\x00}\x00", "no JSON"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -319,3 +320,13 @@ def test_where_joint_3_has_no_real_root_no_joint_is_free(monkeypatch: pytest.Mon
     monkeypatch.setattr(edges, "examine_targets", None)  # takes 50 ms a target
     s = armkin.ik(arm, T)
     assert (s.status == Status.UNREACHABLE).all()
+
+
+def test_on_an_axis_that_an_offset_keeps_the_arm_from_nothing_is_missing() -> None:
+    """The tip stays 10 mm beside the first axis: a point on it has no root, whatever joint 1 does."""
+    arm = load_robot("three_dof")
+    targets = np.array([[0.0, 0.0, -300.0], [0.0, 0.0, 0.0], [0.0, 0.0, 300.0], [0.0, 0.0, 500.0], [1e-300, 0.0, 0.0]])
+    for ik in (partial(armkin.ik, arm), armkin.compile(arm).ik):
+        solutions = ik(targets)
+        assert (solutions.status == Status.UNREACHABLE).all()
+        assert solutions.complete.all()

@@ -147,7 +147,7 @@ BAD = {
     "mjcf": (b'<mujoco model="x"/>', "is not a URDF but a MuJoCo file"),
     "html": (b"<html></html>", "its outermost element is <html>"),
     "not xml": (b"joints: []", "is not XML"),
-    "empty": (b"", "is not XML"),
+    "empty": (b"", "is empty"),
     "cut off": (urdf_of()[:300], "is not XML"),
     "nameless": (urdf_of(('<link name="hand"/>', "<link/>")), "a <link> has no name"),
     "entities": (b'<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>', "has a DTD or entities"),

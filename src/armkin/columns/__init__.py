@@ -9,4 +9,5 @@ input_columns.py       columns of numbers from .npz, .parquet and .jsonl, chunk 
 finished_chunks.py     finished chunks beside a file that is not whole yet, and how a later run goes on with them
 fk_columns.py          joint values to the columns of fk and pulses
 ik_columns.py          targets to the columns of ik
+joint_columns.py       the columns of joints beside others of the same name
 """

@@ -1,12 +1,12 @@
 """Which file a name's ending means, and how chunks become such a file."""
 
+import os
 import shutil
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import IO
 
 from armkin.columns import csv_and_json_lines, npz, parquet
-from armkin.files import file_ending
 
 Source = Callable[[], Iterable[IO[bytes]]]  # opens the parts, one after the other, as often as it is called
 
@@ -36,17 +36,16 @@ _BY_ENDING = {
     ".parquet": Format("parquet", parquet.encode_table, parquet.write_parts),
     ".jsonl": JSON_LINES,
     ".csv": CSV,
-    "": CSV,
 }
-ENDINGS = tuple(name for name in _BY_ENDING if name)
+ENDINGS = tuple(_BY_ENDING)
 
 
 def format_of(path: str | None) -> Format:
-    """The format that a file name's ending says; no name, a name without an ending and a pipe are CSV.
+    """The format that a file name's ending says; no name, any other ending and a pipe are CSV.
 
-    Raises UsageError for another ending.
-
-    >>> format_of("poses.npz").name, format_of("-").name
-    ('npz', 'csv')
+    >>> format_of("poses.npz").name, format_of("-").name, format_of("poses.txt").name
+    ('npz', 'csv', 'csv')
     """
-    return CSV if path is None else _BY_ENDING[file_ending(path, "rows are", ENDINGS, may_lack=True)]
+    if path is None or (os.path.exists(path) and not os.path.isfile(path)):
+        return CSV
+    return _BY_ENDING.get(os.path.splitext(path.lower())[1], CSV)

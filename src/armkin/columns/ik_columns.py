@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.columns.joint_columns import joint_columns
 from armkin.columns.table import Table, Words, join_tables
 from armkin.formula.arrays import numbers_within
 from armkin.inverse import choose_branch
@@ -25,6 +26,7 @@ from armkin.model.lock_joints import unlock
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array, Bool
 
+BRANCH_COLUMNS = ("row", "status", "branch", "within_limits", "residual_mm", "residual_deg", "motion")  # beside joints
 BLOCK_TARGETS = 2_048  # targets processed together, so that their arrays fit the cache
 _STATUS = tuple(status.name.lower() for status in Status)
 
@@ -197,11 +199,12 @@ def _branch_table(
     joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
     within_limits = np.zeros(len(present), bool)
     within_limits[present] = lines.within_limits
-    table |= dict(zip(request.arm.joint_names, joints, strict=True)) | {"within_limits": within_limits}
+    joint_names = joint_columns(request.arm.joint_names, BRANCH_COLUMNS)
+    table |= dict(zip(joint_names, joints, strict=True)) | {"within_limits": within_limits}
     table |= {"residual_mm": distances, "residual_deg": units.angles_out(angles), "motion": lines.motion}
     if all_present:
         return table
-    numbers = (*request.arm.joint_names, "residual_mm", "residual_deg", "motion")
+    numbers = (*joint_names, "residual_mm", "residual_deg", "motion")
     return table | {name: _fill_gaps(np.asarray(table[name]), present) for name in numbers}
 
 

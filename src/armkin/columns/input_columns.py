@@ -3,6 +3,7 @@
 import itertools
 import json
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,25 +16,31 @@ from armkin.errors import FileError, UsageError
 from armkin.formula.arrays import Array
 
 
-def reader_of(path: str) -> Callable[[str, Sequence[str], int], Iterator[Array]] | None:
+def reader_of(path: str) -> Callable[[str, Sequence[str], bool, int], Iterator[Array]] | None:
     """What reads a file of columns, by its ending; None: it is text of rows.
 
-    It is called with the path, the columns wanted and how many rows to give at a time, and yields (N, columns).
+    It is called with the path, the columns wanted, whether these are joints, and how many rows to give at a time, and
+    yields (N, columns).
     """
     return {".npz": _read_npz, ".parquet": _read_parquet, ".jsonl": _read_json_lines}.get(Path(path).suffix.lower())
 
 
-def column_places(heading: Sequence[str], name: str) -> list[int]:
-    """Columns of a name: those of exactly this name, or those with a unit behind it."""
+def column_places(heading: Sequence[str], name: str, of_joint: bool = False) -> list[int]:
+    """Columns of a name: those of exactly this name, or those with a unit behind it.
+
+    of_joint: the name is a joint's, whose column is `joint_x` beside one of another x (`joint_columns`).
+    """
+    if of_joint and f"joint_{name}" in heading:
+        name = f"joint_{name}"
     exact = [i for i, cell in enumerate(heading) if cell == name]
     with_units = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
     return exact or [i for i, cell in enumerate(heading) if cell in with_units]
 
 
-def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> list[str]:
+def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str], of_joints: bool) -> list[str]:
     """The file's names of the columns wanted."""
     lower_heading = [cell.lower() for cell in heading]
-    places_of = {name: column_places(lower_heading, name.lower()) for name in names}
+    places_of = {name: column_places(lower_heading, name.lower(), of_joints) for name in names}
     missing_names = [name for name, places_found in places_of.items() if not places_found]
     if missing_names:
         heading_text = ", ".join(heading[:20])
@@ -46,13 +53,16 @@ def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str]) -> li
     return [heading[places_found[0]] for places_found in places_of.values()]
 
 
-def _read_npz(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+def _read_npz(path: str, names: Sequence[str], of_joints: bool, rows: int) -> Iterator[Array]:
     """Columns `names` of a .npz, (at most rows, columns) at a time. Raises FileError for what cannot be read."""
     try:
         with ExitStack() as stack:
             archive = stack.enter_context(zipfile.ZipFile(path))
             heading = [name.removesuffix(".npy") for name in archive.namelist()]
-            files = [stack.enter_context(archive.open(f"{name}.npy")) for name in _wanted_names(path, heading, names)]
+            files = [
+                stack.enter_context(archive.open(f"{name}.npy"))
+                for name in _wanted_names(path, heading, names, of_joints)
+            ]
             heads = [_array_head(path, name, file) for name, file in zip(names, files, strict=True)]
             if len({count for count, _ in heads}) > 1:
                 raise UsageError(f"{path}: its columns are not of one length")
@@ -78,12 +88,12 @@ def _array_head(path: str, name: str, file: Any) -> tuple[int, np.dtype[Any]]:
     return shape[0], dtype
 
 
-def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+def _read_parquet(path: str, names: Sequence[str], of_joints: bool, rows: int) -> Iterator[Array]:
     """Blocks of so many rows of a Parquet file: the columns named (N, k)."""
     pa = parquet.require_pyarrow()
     try:
         file = pa.parquet.ParquetFile(path)
-        chosen_names = _wanted_names(path, file.schema_arrow.names, names)
+        chosen_names = _wanted_names(path, file.schema_arrow.names, names, of_joints)
         for batch in file.iter_batches(batch_size=rows, columns=chosen_names):
             columns = [batch.column(name) for name in chosen_names]
             for name, column in zip(chosen_names, columns, strict=True):
@@ -96,17 +106,17 @@ def _read_parquet(path: str, names: Sequence[str], rows: int) -> Iterator[Array]
         raise FileError(f"{path}: cannot read: {getattr(error, 'strerror', None) or error}", file=path) from None
 
 
-def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Array]:
+def _read_json_lines(path: str, names: Sequence[str], of_joints: bool, rows: int) -> Iterator[Array]:
     """Blocks of so many rows of a JSON Lines file: the columns named (N, k)."""
     chosen_names: list[str] = []
     try:
-        with open(path, encoding="utf-8") as file:
+        with open(path, encoding="utf-8-sig") as file:
             numbered = ((i, line) for i, line in enumerate(file, 1) if line.strip())
             while lines := list(itertools.islice(numbered, rows)):
                 table = []
                 for number, line in lines:
                     row = _row_object(path, number, line)
-                    chosen_names = chosen_names or _wanted_names(path, list(row), names)
+                    chosen_names = chosen_names or _wanted_names(path, list(row), names, of_joints)
                     table.append([_cell_number(path, number, name, row.get(name)) for name in chosen_names])
                 yield np.array(table, dtype=float)
     except (OSError, UnicodeDecodeError) as error:
@@ -115,11 +125,15 @@ def _read_json_lines(path: str, names: Sequence[str], rows: int) -> Iterator[Arr
 
 def _row_object(path: str, number: int, line: str) -> dict[str, Any]:
     try:
-        row = json.loads(line)
+        pairs = json.loads(line, object_pairs_hook=tuple)
     except ValueError:
-        row = None
-    if not isinstance(row, dict):
+        pairs = None
+    if not isinstance(pairs, tuple):
         raise UsageError(f"{path}: row {number}: this is no JSON object", row=number)
+    row = dict(pairs)
+    if len(row) < len(pairs):
+        doubled = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
+        raise UsageError(f"{path}: row {number}: it has {doubled} twice", row=number)
     return row
 
 
@@ -128,4 +142,6 @@ def _cell_number(path: str, number: int, name: str, value: Any) -> float:
         return np.nan
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise UsageError(f"{path}: row {number}: {name}: {json.dumps(value)[:40]} is no number", row=number)
+    if not np.isfinite(value):
+        raise UsageError(f"{path}: row {number}: {name}: {value} is not finite", row=number)
     return float(value)

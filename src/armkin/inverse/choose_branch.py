@@ -203,7 +203,8 @@ def turns(request: Request, branch: TargetBranch) -> list[list[float]]:
 def refusal_error(request: Request, answer: Answer, distance: float) -> NoSolutionError:
     """The error of an answer without a best branch; distance: [mm] of the nearest pose within limits."""
     arm = request.arm
-    nearest_text = f"the nearest pose within limits is {distance:.4f} mm away"
+    free_text = f"with {', '.join(request.swept)} free " if request.swept else ""
+    nearest_text = f"{free_text}the nearest pose within limits is {distance:.4f} mm away"
     legal = answer.within_limits
     fields: dict[str, Any] = {"robot": arm.name, "status": answer.status}
     fields |= {"distance_mm": distance, "branches_within_limits": legal}

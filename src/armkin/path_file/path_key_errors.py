@@ -27,13 +27,18 @@ def problems(error: ValidationError) -> Iterator[tuple[Place, str]]:
     deepest: dict[Place, Any] = {}
     for problem in error.errors(include_url=False):
         place = _place_of(problem["loc"])
-        if place not in deepest or len(problem["loc"]) > len(deepest[place]["loc"]):
+        if place not in deepest or _nearness(problem) > _nearness(deepest[place]):
             deepest[place] = problem
     for place in list(deepest):  # what is wrong inside a value says more than that the value is wrong
         if any(len(inner) > len(place) and inner[: len(place)] == place for inner in deepest):
             del deepest[place]
     for place, problem in deepest.items():
         yield place, f"{_place_text(place)}{_problem_text(place, problem)}"
+
+
+def _nearness(problem: Any) -> tuple[bool, int]:
+    """How near a shape came: one whose keys are all right, and together wrong, came nearest."""
+    return problem["type"] == "problem", len(problem["loc"])
 
 
 def _place_of(loc: tuple[str | int, ...]) -> Place:
@@ -48,7 +53,8 @@ def _place_of(loc: tuple[str | int, ...]) -> Place:
 
 
 def _is_shape(part: str) -> bool:
-    return any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
+    is_number = part.startswith("constrained-")
+    return is_number or any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
 
 
 def _place_text(place: Place) -> str:

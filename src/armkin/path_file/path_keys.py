@@ -34,6 +34,15 @@ EXAMPLES = {
     "offset": "offset: {xyz: [0, 0, -30], frame: tool}",
     "wait": "wait: 0.5",
     "grip": "grip: closed",
+    "start": "start: home, start: {joints: [0, 90, -90]} or start: {point: [390, 80, 300]}",
+    "corners": "corners: stop, corners: blend or corners: tolerance",
+    "tolerance": "tolerance: 0.1",
+    "turn_tolerance": "turn_tolerance: 0.1",
+    "tool_speed": "tool_speed: 100",
+    "speed": "speed: 50",
+    "blend": "blend: 5",
+    "robot": "robot: three_dof",
+    "task": "task: xyz",
 }
 
 

@@ -18,6 +18,7 @@ from typing import IO, TYPE_CHECKING
 
 import numpy as np
 
+from armkin.columns.joint_columns import joint_columns
 from armkin.files import file_ending, write_whole
 from armkin.formula.arrays import Array
 from armkin.model import units
@@ -48,7 +49,8 @@ def open_cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iter
 
 @contextmanager
 def _csv_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
-    heading = [*arm.joint_names, "x", "y", "z", *measures]
+    others = ["x", "y", "z", *measures]
+    heading = [*joint_columns(arm.joint_names, others), *others]
     file.write(f"{','.join(heading)}\n".encode())
     row = ",".join(["%.10g"] * len(heading)) + "\n"
 

@@ -55,6 +55,8 @@ def locate(robot: str) -> str:
 
 
 def _missing_text(robot: str) -> str:
+    if not robot:
+        return "the robot file's name is empty; name a file or a shipped robot (three_dof, ur5e, ...: armkin robots)"
     near = _similar_names(robot)
     if near:
         return f"there is no robot {robot}; did you mean {' or '.join(near)}?"

@@ -148,7 +148,7 @@ def _error_text(error: Any) -> str:
     kind, path, value = error["type"], error["loc"], error["input"]
     context = error.get("ctx", {})
     if path and path[-1] in ("sign", "direction"):
-        return f"must be 1 or -1, not {value_text(value)}"
+        return f"must be 1 or -1, not {value if isinstance(value, float) else value_text(value)}"
     if kind in _BOUNDS:
         text = f"{_BOUNDS[kind].format(**context)}, not {value_text(value)}"
         is_negative_ratio = path[-1] in ("gear", "pulley") and value < 0

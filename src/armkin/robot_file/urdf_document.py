@@ -110,6 +110,8 @@ def parse_document(raw: bytes, name: str) -> tuple[str, Tree]:
         ) from None
     reader = _Reader(name)
     parser = DefusedXMLParser(target=reader, forbid_dtd=True)
+    if not raw.strip():
+        raise RobotFileError(f"{name}: is empty; a URDF begins with <robot name=...>")
     try:
         parser.feed(raw.lstrip())  # some real files begin with an empty line, which XML forbids
         parser.close()

@@ -4,6 +4,7 @@ board.py            a kind of board: one class, with capabilities
 motion_start.py     checks on the start of every trajectory that becomes counts
 sent_positions.py   trajectories for boards that take positions instead of segments
 servo_arm.py        an arm of bus servos of any make
+servo_travel.py     checks that a motion takes no servo farther than it can turn
 stepper_arm.py      an arm of steppers on a board that obeys every program
 position_record.py  the position that armkin last left on a board that other programs use, too
 assumptions.py      assumed motors and rates for a simulation

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from armkin.board.backend import Backend, Position, Progress, StoppedError
 from armkin.board.backend.motion_start import from_counts
 from armkin.board.backend.sent_positions import Job, braking_time
+from armkin.board.backend.servo_travel import first_beyond
 from armkin.errors import LinkError, NoSolutionError, PositionKnownError, UsageError
 from armkin.model.units import joints_out
-from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_names, pulses
 
 if TYPE_CHECKING:
@@ -185,16 +185,13 @@ class ServoArm(Backend):
 
     def _check_limits(self, job: Job) -> None:
         """Raise NoSolutionError if a job takes a servo outside its own limits, or farther out if it starts outside."""
-        low, high = np.minimum(self._limits[:, 0], job.start), np.maximum(self._limits[:, 1], job.start)
-        for stretch in job.trajectory.stretches:
-            count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / SEND_PERIOD)), 1)
-            goals = pulses(self.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
-            for row, k in np.argwhere((goals < low) | (goals > high))[:1]:
-                lower, upper = self._limits[k].tolist()
-                raise NoSolutionError(
-                    f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {goals[row, k]} counts is outside its own "
-                    f"limits {lower} to {upper} ({self.limits_at}): nothing was moved"
-                )
+        if (found := first_beyond(job.trajectory, job.start, self._limits)) is not None:
+            k, count = found
+            lower, upper = self._limits[k].tolist()
+            raise NoSolutionError(
+                f"servo {self.ids[k]} ({motor_names(self.arm)[k]}): {count} counts is outside its own "
+                f"limits {lower} to {upper} ({self.limits_at}): nothing was moved"
+            )
 
     def _follow(self, trajectory: Trajectory, report: Callable[[float], None]) -> None:
         """Stream a trajectory in real time; a stop slows the plan's time down, so that the arm stays on its path."""

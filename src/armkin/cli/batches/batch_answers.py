@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import IO, Any, NamedTuple, Protocol
 
 from armkin import __version__, files
@@ -17,7 +18,7 @@ from armkin.cli.printing import output
 from armkin.cli.printing.render import to_json
 from armkin.columns.csv_cells import csv_line
 from armkin.columns.finished_chunks import Parts
-from armkin.columns.formats import Format, format_of
+from armkin.columns.formats import CSV, Format, format_of
 from armkin.columns.table import Table
 from armkin.engines.ordered_chunks import Engine, in_order
 from armkin.errors import ArmkinError, FileError, NoSolutionError, UnfinishedError, UsageError
@@ -56,13 +57,16 @@ class Tally:
             self.skipped + chunk_tally.skipped,
         )
 
-    def conclude(self, unsolvable: bool) -> None:
-        """Warn of rows outside the limits; raise NoSolutionError for rows without a best branch."""
+    def conclude(self, unsolvable: bool, outside: str = "the limits") -> None:
+        """Warn of rows outside the limits; raise NoSolutionError for rows without a best branch.
+
+        outside: in words, what else rows are outside of.
+        """
         if not self.bad:
             return
         first_text = f"the first is row {self.first_bad}"
         if not unsolvable:
-            output.warn(f"{self.bad} of {self.rows} rows are outside the limits; {first_text}")
+            output.warn(f"{self.bad} of {self.rows} rows are outside {outside}; {first_text}")
             return
         raise NoSolutionError(
             f"{self.bad} of {self.rows} rows have no branch within limits; {first_text}",
@@ -157,7 +161,11 @@ def _json_lines(questions: Questions, chunk: Chunk, tally: Tally) -> bytes:
         span = slice(start, start + _OBJECT_ROWS)
         part = Chunk(chunk.numbers[span], chunk.values[span])
         for number, answer in zip(part.numbers, questions.objects(part), strict=True):
-            is_bad = answer["best"] is None if questions.unsolvable else bool(answer["violations"])
+            is_bad = (
+                answer["best"] is None
+                if questions.unsolvable
+                else bool(answer["violations"] or answer.get("outside_travel"))
+            )
             tally.add(Tally(1, int(is_bad), number if is_bad else 0))
             lines.append(to_json(answer))
     return "\n".join([*lines, ""]).encode()
@@ -194,10 +202,19 @@ class BatchRun:
         """Answer all pieces."""
         to_file = self.out is not None and self.out != "-"
         file_format = format_of(self.out if to_file else None)
-        if self.as_json and (not file_format.is_text or str(self.out).lower().endswith(".csv")):
+        if self.as_json and not file_format.is_text:
             raise UsageError(f"--json and --out {self.out}: JSON is text; leave one away, or end the name with .jsonl")
         if self.resume and not to_file:
             raise UsageError("--resume goes on with --out FILE; give the file")
+        if (
+            to_file
+            and file_format is CSV
+            and not self.as_json
+            and Path(str(self.out)).suffix.lower() not in ("", ".csv")
+        ):
+            output.note(
+                f"{self.out}: rows are written as CSV; a name that ends in .npz, .parquet or .jsonl says otherwise"
+            )
         ending = "" if file_format.name == "csv" else f".{file_format.name}"
         job = Job(self.questions, self.as_json, ending, self.compiled)
         tally = Tally()

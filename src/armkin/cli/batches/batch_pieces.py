@@ -52,7 +52,7 @@ class InputRows:
     ) -> None:
         """source: a name, or None for given values; the others: see `csv_to_numbers.CsvColumns`."""
         self.source, self.names, self.purpose = source, tuple(names), purpose
-        self.named, self.values = named, values
+        self.named, self.values, self.has_heading = named, values, False
         if source is not None:
             files.protect_input(0 if source == "-" else source)  # before an output of that name is opened
 
@@ -83,11 +83,11 @@ class InputRows:
         read = reader_of(self.source)
         if read is None:
             return self._of_text(self.source)
-        return self._of_values(read(self.source, self.names, csv_to_numbers.CHUNK_ROWS))
+        return self._of_values(read(self.source, self.names, self.named is not None, csv_to_numbers.CHUNK_ROWS))
 
     def empty(self, skipped: int) -> ArmkinError:
         """The error of an input without rows."""
-        reason = "has no row with values" if skipped else "is empty"
+        reason = "has no row with values" if skipped or self.has_heading else "is empty"
         name = csv_to_numbers.name_of(self.source or "-")
         return UsageError(f"{name} {reason}; it needs one row of {','.join(self.names)} per pose")
 
@@ -120,6 +120,7 @@ class InputRows:
                         learner.row(line, i)
                     except UsageError:
                         break
+                self.has_heading = bool(learner.heading)
                 number, first = number + 1, first + csv_to_numbers.line_count(block)
 
 

@@ -11,6 +11,7 @@ from armkin.cli.boards.board_link import SIM, Link
 from armkin.cli.parsing import arguments, path_options
 from armkin.cli.printing import output, path_text, render
 from armkin.columns.csv_cells import csv_line
+from armkin.columns.joint_columns import joint_columns
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -173,7 +174,8 @@ def _write_samples(plan: PathPlan, name: str) -> None:
     import numpy as np
 
     arm = plan.arm
-    heading = ["time_s", *arm.joint_names, *(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]
+    others = [*(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]
+    heading = ["time_s", *joint_columns(arm.joint_names, ["time_s", *others]), *others]
     t = np.append(np.arange(0.0, plan.duration, _ROW_PERIOD), plan.duration)
     with output.destination(name) as write:
         write(csv_line(heading) + "\n")

@@ -11,6 +11,7 @@ from armkin.cli.parsing import arguments
 from armkin.cli.parsing.csv_to_numbers import batch_rows
 from armkin.cli.parsing.options import Json, Out, Robot
 from armkin.cli.printing import output, render
+from armkin.columns.joint_columns import joint_columns
 from armkin.errors import UsageError
 from armkin.model import units
 from armkin.model.target_numbers import targets_in
@@ -64,7 +65,8 @@ def calibrate(
         output.check_destination(out, "poses to measure are", ".json" if json else ".csv")
     arm = arguments.load_arm(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
-    names = [*arm.joint_names, "x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
+    tip_names = ["x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
+    names = [*joint_columns(arm.joint_names, tip_names), *tip_names]
     numbers, rows = _measured_rows(measured, names, arm)
     if suggest is not None:
         _print_suggestions(arm, suggest, rows, kinds, json, out)

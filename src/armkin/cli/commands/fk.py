@@ -74,6 +74,8 @@ def fk(
         "frames": frames,
         "compiled": compiled,
     }
+    if frames and not json:
+        output.note("--frames goes with --json: columns have the tool alone")
     questions = FkQuestions(arm, frames, compiled)
     batch_run = BatchRun(
         questions=questions, out=out, as_json=json, workers=workers, cluster=cluster, resume=resume, settings=identity

@@ -248,10 +248,12 @@ class IkQuestions:
         """What `table` returns, by way of an object a row, for what is not asked of each row by itself."""
         import numpy as np
 
+        from armkin.columns.ik_columns import BRANCH_COLUMNS
+        from armkin.columns.joint_columns import joint_columns
         from armkin.columns.table import table_of_records
 
-        measures = ("within_limits", "residual_mm", "residual_deg", "motion")
-        heading = ["row", "status", "branch", *self.request.arm.joint_names, *measures]
+        joint_names = joint_columns(self.request.arm.joint_names, BRANCH_COLUMNS)
+        heading = [*BRANCH_COLUMNS[:3], *joint_names, *BRANCH_COLUMNS[3:]]
         records: list[list[Any]] = []
         has_best: list[bool] = []
         for number, answer in zip(chunk.numbers, self.objects(chunk, with_closest=False), strict=True):

@@ -72,7 +72,7 @@ def pulses(
     batch_run = BatchRun(
         questions=questions, out=out, as_json=json, workers=workers, cluster=cluster, resume=resume, settings=identity
     )
-    batch_run.run(rows).conclude(questions.unsolvable)
+    batch_run.run(rows).conclude(questions.unsolvable, "the limits or what a servo can turn")
 
 
 @dataclass(frozen=True)
@@ -85,11 +85,10 @@ class PulseQuestions:
     unsolvable = False
 
     def table(self, chunk: Chunk) -> tuple[Table, Any]:
-        """The columns, and which rows are within limits."""
+        """The columns, and which rows are within limits and the servos' travel."""
         from armkin.columns import fk_columns
 
-        columns = fk_columns.pulse_columns(self.arm, chunk.values, self.best)
-        return columns, columns["within_limits"]
+        return fk_columns.pulse_columns(self.arm, chunk.values, self.best)
 
     def objects(self, chunk: Chunk) -> Iterator[Pulses]:
         """An object a row."""

@@ -19,6 +19,7 @@ from armkin.cli.parsing.number_parsing import number
 from armkin.cli.parsing.options import BranchName, Joints, Json, Lock, RobotOrPipe, Scene, Speed, TaskName, Tool
 from armkin.cli.printing import output, render
 from armkin.columns.csv_cells import csv_line
+from armkin.columns.joint_columns import joint_columns
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model import units
 
@@ -300,8 +301,8 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
     """The plans as CSV, one after another: time [s], joints [deg, mm] and the joints' positions [mm]; None: no file."""
     if path is None:
         return
-    names = [*arm.joint_names, "tool"]
-    heading = ["time_s", *arm.joint_names, *(f"{name}_{axis}_mm" for name in names for axis in "xyz")]
+    others = [f"{name}_{axis}_mm" for name in [*arm.joint_names, "tool"] for axis in "xyz"]
+    heading = ["time_s", *joint_columns(arm.joint_names, ["time_s", *others]), *others]
     begin_time = 0.0
     with output.destination(path) as write:
         write(csv_line(heading) + "\n")

@@ -35,12 +35,14 @@ class CsvColumns:
     """Where each number stands in a line, learnt from the first line that is neither empty nor a comment.
 
     names: what the numbers are called; purpose: who wants them, for messages; named: values that one word stands
-    for (poses). A heading may have other columns, too, and any order; `x_mm`, `x/mm` and a trace's `tool_x_mm`
-    are x. A row whose wanted cells are all empty (a target that `ik` did not reach) is skipped and counted.
+    for (poses); None: the numbers are no joint values. A heading may have other columns, too, and any order; `x_mm`,
+    `x/mm` and a trace's `tool_x_mm` are x, a joint x is `joint_x` where there are both. A row whose wanted cells are
+    all empty (a target that `ik` did not reach) is skipped and counted.
     """
 
     def __init__(self, names: Sequence[str], purpose: str, named: Mapping[str, Sequence[float]] | None = None) -> None:
         self.names, self.purpose, self.named = names, purpose, named or {}
+        self.of_joints = named is not None
         self.places: list[int] | None = None
         self.heading: list[str] = []
         self.skipped = 0
@@ -104,7 +106,7 @@ class CsvColumns:
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
         lower_cells = [cell.lower() for cell in cells]
-        places_of = {name: _column_places(lower_cells, name.lower()) for name in self.names}
+        places_of = {name: _column_places(lower_cells, name.lower(), self.of_joints) for name in self.names}
         if not any(places_of.values()):
             self._refuse_another(cells)
             return False
@@ -155,7 +157,7 @@ def _all_rows(
     if columns.skipped:
         output.warn(f"{columns.skipped} row{'s' * (columns.skipped > 1)} without {','.join(names)} skipped")
     if empty:
-        reason = "has no row with values" if columns.skipped else "is empty"
+        reason = "has no row with values" if columns.skipped or columns.heading else "is empty"
         raise UsageError(f"{name_of(source)} {reason}; it needs one row of {','.join(names)} per pose")
 
 
@@ -361,13 +363,13 @@ def _split_cells(text: str) -> list[str]:
     if '"' not in text:
         return [cell.strip() for cell in text.split(",")]
     try:
-        return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
+        return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True, strict=True))]
     except csv.Error:
-        raise UsageError("this is no CSV of numbers: its quotes do not match") from None
+        raise UsageError("this is no CSV of numbers: its quotes do not match; leave quotes out") from None
 
 
-def _column_places(heading: Sequence[str], name: str) -> list[int]:
+def _column_places(heading: Sequence[str], name: str, of_joint: bool) -> list[int]:
     """See `armkin.columns.input_columns.column_places`."""
     from armkin.columns.input_columns import column_places  # imported here, as it needs numpy
 
-    return column_places(heading, name)
+    return column_places(heading, name, of_joint)

@@ -3,7 +3,7 @@
 from collections.abc import Collection
 
 _NOT_NUMBERS = ("inf", "infinity", "nan")
-_SHORT_FOR = {"--assume-home": ("--assume", "home")}
+_SHORT_FOR = {"--assume-home": ("--assume", "home")}  # of commands that have the first of these
 
 
 def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
@@ -24,7 +24,8 @@ def options_first(args: list[str], takes_value: Collection[str]) -> list[str]:
         elif word[:1] != "-" or word == "-" or _looks_like_number(word):
             words.append(word)
         else:
-            options.extend(_SHORT_FOR.get(word, (word,)))
+            long_form = _SHORT_FOR.get(word, (word,))
+            options.extend(long_form if long_form[0] in takes_value else (word,))
             if word in takes_value:
                 value = next(words_left, None)
                 if value is None:

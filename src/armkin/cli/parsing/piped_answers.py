@@ -175,11 +175,11 @@ def _parse_answer(text: str) -> dict[str, Any]:
         answer = json.loads(text)
     except (ValueError, RecursionError):
         raise UsageError(_NO_JSON) from None
-    if not isinstance(answer, dict) or not all(
-        isinstance(answer.get(key), str) for key in ("robot_file", "robot_sha256")
-    ):
-        raise UsageError("standard input is no answer of armkin fk, ik or pulses: it names no robot_file")
-    return answer
+    named = answer if isinstance(answer, dict) else {}
+    for key in ("robot_file", "robot_sha256"):
+        if not isinstance(named.get(key), str):
+            raise UsageError(f"standard input is no answer of armkin fk, ik or pulses: it has no {key}")
+    return named
 
 
 def _answer_pose(answer: dict[str, Any]) -> Pose:

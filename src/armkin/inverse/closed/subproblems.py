@@ -166,7 +166,8 @@ def linear(
     merge. Returns the pair and doubt: where the roots are about to merge or the angle is free.
 
     Without a real root the pair is that of the closest angle, not normalised; the caller finds by
-    its residual that it is no solution, or normalises it where the residual would not show.
+    its residual that it is no solution, or normalises it where the residual would not show. Where a and b vanish and c
+    does not there is none, whatever the angle.
     """
     sign = signs(axis)
     h2 = arrays.add(arrays.mul(a, a), arrays.mul(b, b))
@@ -174,18 +175,18 @@ def linear(
     thresholds = precision()
     edge = arrays.absolute(disc) < (thresholds.tangent if tangent is None else tangent) * h2
     root = arrays.sqrt(arrays.maximum(disc, 0.0)) * sign
-    least = thresholds.free * scale * scale
-    if isinstance(h2, float) and isinstance(least, float):
-        free: Truth = (c == c) if h2 < least else False  # a constant equation: free for every target
-        inverse: Entry = 1.0 / max(h2, least)
-    else:
-        free = h2 < least
-        inverse = 1.0 / arrays.maximum(h2, least)
+    least, nothing = thresholds.free * scale * scale, thresholds.nearly_free * scale * scale
+    is_constant = isinstance(h2, float) and isinstance(least, float)
+    inverse: Entry = 1.0 / (max(h2, least) if is_constant else arrays.maximum(h2, least))
     ci, ri = c * inverse, root * inverse
     cos = arrays.sub(arrays.mul(a, ci), arrays.mul(b, ri))
     sin = arrays.add(arrays.mul(b, ci), arrays.mul(a, ri))
-    nearly = h2 < thresholds.nearly_free * scale * scale
-    return with_preferred(Pair(cos, sin), h2 < least, prefer), Doubt(edge | nearly, free)
+    free, nearly = h2 < least, h2 < nothing
+    pair = with_preferred(Pair(cos, sin), free, prefer)
+    if np.any(nearly):
+        has_roots = c * c < nothing
+        free, nearly = free & has_roots, nearly & has_roots
+    return pair, Doubt(edge | nearly, free)
 
 
 def one_root(a: Entry, b: Entry, c: Entry) -> Entry:

@@ -65,7 +65,8 @@ def read_near(arm: Arm, near: ArrayLike | None, lead: tuple[int, ...]) -> Array:
     """Joint values to stay close to, (n,) or (*lead, n) [rad | mm]; by default home. Raises UsageError for others."""
     reference = arm.home if near is None else arrays.real_array(near, "near")
     if reference.shape != (arm.n,) and reference.shape != (*lead, arm.n):
-        raise UsageError(f"near has shape {reference.shape}; expected ({arm.n},) or {(*lead, arm.n)}")
+        shapes = " or ".join(dict.fromkeys([str((arm.n,)), str((*lead, arm.n))]))
+        raise UsageError(f"near has shape {reference.shape}; expected {shapes}")
     if not np.isfinite(reference).all():
         raise UsageError("near holds nan or infinity; every joint value must be finite")
     return reference

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armkin.board.backend.motion_start import StartedTrajectory
+from armkin.board.backend.servo_travel import check_servo_travel
 from armkin.board.firmware.segments.counts_to_segments import CLOCK_RATE, MIN_INTERVAL, Counts, Move
 from armkin.board.firmware.segments.curve_segments import CurveSegments, sampled_rates
 from armkin.board.firmware.segments.straight_lines import Pieces, line_segments, segment_count
@@ -109,7 +110,8 @@ def cut_trajectory(
 ) -> Cut:
     """A trajectory that starts at counts `start` (motors,), for a board of this clock and shortest interval.
 
-    Raises RateError, naming joint and motor, if the board cannot make steps that fast.
+    Raises RateError, naming joint and motor, if the board cannot make steps that fast, and NoSolutionError, naming the
+    servo, for a motion beyond its travel.
     """
     arm, first = trajectory.arm, np.asarray(start, dtype=np.int64)
     ends = [pulses(arm, stretch.end) for stretch in trajectory.stretches]
@@ -118,6 +120,7 @@ def cut_trajectory(
             raise UsageError(
                 f"motor {motor_names(arm)[k]} would stand at {end[k]:,} counts; a board counts to {MAX_COUNTS:,}"
             )
+    check_servo_travel(trajectory, first)
     top = np.zeros(len(first))
     begin, allowed = first, clock / min_interval
     for stretch, end in zip(trajectory.stretches, ends, strict=True):
