@@ -97,3 +97,15 @@ def test_a_reachable_legal_target_is_its_own_closest_pose() -> None:
     arm = armkin.load(ROBOTS / "three_dof.yaml")
     closest = armkin.closest(arm, [390, 80, 300])
     assert closest.distance < 1e-6
+
+
+def test_just_beyond_a_stretched_elbow_the_closest_pose_is_found_to_a_nanometre() -> None:
+    """There the distance is a fold's, which is flat: a posture 0.01 rad off is 4 um farther from a target 1 um away."""
+    arm, rng = armkin.load(ROBOTS / "three_dof.yaml"), np.random.default_rng(3)
+    for beyond in 10.0 ** rng.uniform(-5.0, 0.0, 40):  # [mm]
+        q = np.deg2rad([rng.uniform(-110, 110), rng.uniform(-10, 110), 0.0])
+        shoulder, tip = armkin.frames(arm, q)[[1, -1], :3, 3]
+        target = tip + beyond * (tip - shoulder) / np.linalg.norm(tip - shoulder)
+        found = armkin.closest(arm, target)
+        assert found.converged
+        assert found.distance <= np.linalg.norm(target - tip) + 1e-6

@@ -196,7 +196,8 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
         H = 0.5 * (H + np.swapaxes(H, 1, 2))
         values, vectors = np.linalg.eigh(np.where(free[:, :, None] & free[:, None, :], H, np.eye(n)))
         slope = np.abs(np.where(free, downhill, 0.0)).max(axis=1)
-        is_minimum = (slope <= tol.FLAT_GRADIENT * (1.0 + cost[active])) & (values[:, 0] > -tol.UPHILL_CURVATURE)
+        is_flat = slope <= tol.FLAT_GRADIENT * (np.sqrt(cost[active]) + cost[active]) + tol.ERROR
+        is_minimum = is_flat & (values[:, 0] > -tol.UPHILL_CURVATURE)
         converged[active] = is_minimum
         active, rows_left = active[~is_minimum], np.flatnonzero(~is_minimum)
         if not len(active):
@@ -212,7 +213,7 @@ def _finish_by_newton(arm: Arm, task: Task, q: Array, target: Array) -> tuple[Ar
             trial = np.clip(q[rows] + shrink * step[pending] * unit, arm.lower, arm.upper)
             new_cost = _cost(arm, task, trial, target[rows])
             # accept a cost equal to rounding, since the gradient may still decrease
-            accepted = new_cost <= cost[rows] * (1.0 + tol.EQUAL_BUT_ROUNDING)
+            accepted = new_cost <= cost[rows] + tol.EQUAL_BUT_ROUNDING * (cost[rows] + np.sqrt(cost[rows]))
             q[rows[accepted]], cost[rows[accepted]] = trial[accepted], new_cost[accepted]
             pending = pending[~accepted]
             if not len(pending):
