@@ -74,6 +74,24 @@ def test_a_row_is_the_posture_of_its_interval_nearest_to_near(name: str, task: s
     assert np.nanmax(np.take_along_axis(again.motion, again.best[:, None], axis=1)) <= 1e-6
 
 
+@pytest.mark.parametrize("x_y", [(200.0, 100.0), (0.0, 300.0), (-150.0, 250.0)])
+def test_a_row_is_at_its_interval_s_end_where_that_is_nearest(x_y: tuple[float, float]) -> None:
+    """Where two branches merge one goes away from near, whatever it does farther on; by the law of cosines."""
+    arm = armkin.load("planar_3dof")
+    solutions = armkin.ik(arm, np.array(x_y), "xy")
+    assert solutions.valid.sum() >= 2
+    for branch in np.flatnonzero(solutions.valid).tolist():
+        low, high = solutions.interval[branch]
+        q1 = np.linspace(low, high, 20_001)
+        x, y = x_y[0] - 200.0 * np.cos(q1), x_y[1] - 200.0 * np.sin(q1)
+        q3 = np.arccos(np.clip((x * x + y * y - 300.0**2 - 100.0**2) / (2.0 * 300.0 * 100.0), -1.0, 1.0))
+        if solutions.names[solutions.branch[branch]] == "elbow up":
+            q3 = -q3
+        q2 = np.arctan2(y, x) - np.arctan2(100.0 * np.sin(q3), 300.0 + 100.0 * np.cos(q3)) - q1
+        motions = np.abs([(value + np.pi) % (2.0 * np.pi) - np.pi for value in (q1, q2, q3)]).sum(axis=0)
+        assert np.rad2deg(np.abs(solutions.q[branch]).sum() - motions.min()) < 0.02
+
+
 def count_over_a_turn(arm: armkin.Arm, target: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Legal postures of joint 7 at values (K,): its closed form asked at each."""
     find = Follower(ik, arm, redundancy(arm, None), target[None], np.zeros((1, 7)))  # type: ignore[arg-type]

@@ -98,10 +98,10 @@ static void arm_nearest_postures(const double *goal, const double *near, arm_pie
         const double own = near[ARM_JOINTS - 1];
         const double value = own + rint((all->at[p] - own) / ARM_TURN) * ARM_TURN;
         t[i] = value >= all->a[p] && value <= all->b[p] ? value : all->at[p];
-        low[i] = all->low[p];
-        high[i] = all->high[p];
-        left[i] = all->at[p] + ARM_PROBE * (low[i] - all->at[p]);
-        right[i] = all->at[p] + ARM_PROBE * (high[i] - all->at[p]);
+        low[i] = all->a[p];
+        high[i] = all->b[p];
+        left[i] = all->at[p] + ARM_PROBE * (all->low[p] - all->at[p]);
+        right[i] = all->at[p] + ARM_PROBE * (all->high[p] - all->at[p]);
         middle[i] = all->cost[p];
     }
     arm_costs(goal, near, all, open, count, t, at_new);

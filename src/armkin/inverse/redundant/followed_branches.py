@@ -47,10 +47,13 @@ class Followed(NamedTuple):
         return cls(follower, stack_rows(parts), is_short, complete)
 
     def values_to_try(self, pieces: Pieces, near: Array) -> list[Array]:
-        """Values of the parameter (P,) that may hold the posture nearest to near (P, n): its own, beside the best."""
+        """Values of the parameter (P,) that may hold the posture nearest to near (P, n): its own, and both ends.
+
+        At an end where branches merge, the motion along one of them is least, however it goes on from there.
+        """
         value = near[:, self.follower.redundant.joint]
         value = value + np.round((pieces.at - value) / (2 * np.pi)) * 2 * np.pi
-        return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.low, pieces.high]
+        return [np.where((value >= pieces.a) & (value <= pieces.b), value, pieces.at), pieces.first, pieces.last]
 
     def at(self, pieces: Pieces, parameter: Array) -> tuple[Array, Bool]:
         """Postures of pieces at values of the joint, and whether they are legal: as `Turning.at`."""
