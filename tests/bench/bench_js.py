@@ -66,10 +66,11 @@ const goals = Array.from({{ length: {count} }}, (_, k) => {{
   const one = Array.from(flat.subarray(k * {size}, (k + 1) * {size}));
   return one.length === 16 ? [0, 4, 8, 12].map((i) => one.slice(i, i + 4)) : one;
 }});
+const held = arm.redundant ? arm.home[arm.names.indexOf(arm.redundant)] : undefined;
 let [best, total] = [1e9, 0];
 for (let round = 0; round < {rounds}; round++) {{
   const began = process.cpuUsage();
-  for (const goal of goals) total += arm.ik(goal).branches.length;
+  for (const goal of goals) total += arm.ik(goal, arm.home, held).branches.length;
   const used = process.cpuUsage(began);
   best = Math.min(best, (used.user + used.system) / 1e6);
 }}
@@ -141,7 +142,7 @@ def _held_differences(arm: armkin.Arm, folder: Path, q: np.ndarray, joint: int) 
     near = np.tile(arm.home, (len(q), 1))
     near[:, joint] = q[:, joint]
     targets = armkin.fk(arm, q)
-    answers = ask_module(arm, folder, q, near, targets)["ik"]
+    answers = ask_module(arm, folder, q, near, targets, held=near[:, joint])["ik"]
     different = []
     for k, value in enumerate(values):
         mine = answers[k :: len(values)]

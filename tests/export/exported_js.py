@@ -28,7 +28,7 @@ import * as arm from './arm.mjs';
 import { readFileSync, writeFileSync } from 'node:fs';
 const asked = JSON.parse(readFileSync('asked.json', 'utf8'));
 const began = process.hrtime.bigint();
-const ik = asked.targets.map((target, k) => arm.ik(target, asked.near[k]));
+const ik = asked.targets.map((target, k) => arm.ik(target, asked.near[k], asked.held?.[k]));
 const seconds = Number(process.hrtime.bigint() - began) / 1e9;
 const told = { ik, seconds, redundant: arm.redundant };
 for (const name of ['fk', 'jacobian', 'target', 'pulses']) if (arm[name]) told[name] = asked.q.map(arm[name]);
@@ -45,13 +45,19 @@ def ask_module(
     near: np.ndarray | None = None,
     targets: np.ndarray | None = None,
     task: str | None = None,
+    held: np.ndarray | None = None,
 ) -> dict[str, Any]:
-    """What the exported module says of postures (N, n): fk, jacobian, target, pulses, and ik of targets."""
+    """What the exported module says of postures (N, n): fk, jacobian, target, pulses, and ik of targets.
+
+    held: (N,) where the joint to spare is held.
+    """
     node = shutil.which("node")
     assert node, "node runs the module; scripts/test installs it"
     goals = goals_of(arm, q) if targets is None else targets
     close = np.broadcast_to(arm.home, q.shape) if near is None else near
     question = {"q": q.tolist(), "targets": goals.tolist(), "near": close.tolist()}
+    if held is not None:
+        question["held"] = held.tolist()
     (folder / "arm.mjs").write_text(_text_of(arm, task), encoding="utf-8")
     (folder / "asked.json").write_text(json.dumps(question))
     (folder / "ask.mjs").write_text(_ASK)

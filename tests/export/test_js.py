@@ -245,11 +245,12 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
     rng = np.random.default_rng(8)
     q = rng.uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
     targets = targets_of(spare.task, armkin.fk(arm, q), q)
-    answers = ask_module(arm, tmp_path, q, near=q, targets=targets, task=task)
-    assert ask_module(arm, tmp_path, q, near=q, targets=targets.reshape(count, -1), task=task)["ik"] == answers["ik"]
+    j, joint = spare.joint, arm.joint_names[spare.joint]
+    answers = ask_module(arm, tmp_path, q, near=q, targets=targets, task=task, held=q[:, j])
+    flat = targets.reshape(count, -1)
+    assert ask_module(arm, tmp_path, q, near=q, targets=flat, task=task, held=q[:, j])["ik"] == answers["ik"]
     assert np.abs(np.array(answers["fk"]) - armkin.fk(arm, q)).max() < 1e-12 * arm.reach
     assert np.abs(np.array(answers["target"]) - targets).max() < 1e-9
-    j, joint = spare.joint, arm.joint_names[spare.joint]
     assert answers["redundant"] == joint
     for posture, target, answer in zip(q, targets, answers["ik"], strict=True):
         locked_arm = armkin.lock(arm, {joint: posture[j]})
@@ -258,6 +259,42 @@ def test_of_an_arm_with_a_joint_to_spare_that_joint_is_held(
         for row in answer["branches"]:
             del row["joints"][j]
         assert not differences(locked_arm, [answer], s)
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "count"),
+    [("panda", None, 30), ("iiwa7", None, 20), ("planar_3dof", "xy", 20), ("ur5e", "xyz_axis", 20)],
+)
+def test_without_a_held_joint_the_module_lists_families(
+    name: str, task: str | None, count: int, tmp_path: Path
+) -> None:
+    arm = armkin.load(name)
+    q = np.random.default_rng(8).uniform(np.maximum(arm.lower, -np.pi), np.minimum(arm.upper, np.pi), (count, arm.n))
+    spare = redundancy(arm, task)
+    assert spare is not None
+    targets = targets_of(spare.task, armkin.fk(arm, q), q)
+    near = np.where(np.arange(count)[:, None] % 2, q, arm.home)
+    answers = ask_module(arm, tmp_path, q, near=near, targets=targets, task=task)["ik"]
+    s = armkin.ik(arm, targets, task, near=near)
+    same = 0
+    for k, answer in enumerate(answers):
+        rows = [row for row in answer["branches"] if row["within_limits"]]
+        legal = [b for b in s.order[k] if s.within_limits[k, b]]
+        assert (answer["status"], answer["complete"]) == (armkin.Status(s.status[k]).name.lower(), False)
+        assert answer["best"] == 0
+        assert rows[0]["motion"] < np.deg2rad(s.motion[k, s.best[k]]) + 1e-6
+        theirs = np.array([(*row["family"]["interval"], row["motion"]) for row in rows])
+        ours = np.array([(*s.interval[k, b], np.deg2rad(s.motion[k, b])) for b in legal])
+        if len(ours) == len(theirs):  # a motion may be less: beside singular postures there are more samples here
+            apart = np.abs(theirs[:, None] - ours)
+            alike = (apart[..., :2].max(axis=2) < 1e-6) & (apart[..., 2] < np.deg2rad(0.1))
+            same += alike.any(axis=0).all() and alike.any(axis=1).all()
+        joints = np.array([row["joints"] for row in answer["branches"]])
+        error = residual(s.task, armkin.fk(arm, joints), joints, targets[[k] * len(joints)])
+        assert np.abs(error).max() < 1e-9 * arm.reach
+        if k % 2:  # the arm stands there
+            assert rows[0]["joints"] == q[k].tolist()
+    assert same >= 0.9 * count
 
 
 def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from(tmp_path: Path) -> None:
@@ -275,7 +312,7 @@ def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from
 def test_a_held_joint_outside_its_limits_leaves_no_best_branch(tmp_path: Path) -> None:
     arm = armkin.load("panda", scene=str(ROOT / "examples" / "scenes" / "ur5e.yaml"))
     q = np.array([[0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 0.5], [0.1, 0.3, -0.2, -1.8, 0.2, 1.9, 3.0]])
-    answers = ask_module(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))
+    answers = ask_module(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q), held=q[:, 6])
     inside, outside = answers["ik"]
     assert (inside["best"], inside["closest"]) == (0, None)
     hit = [bool(row["hits"]) for row in inside["branches"] if row["within_limits"]]

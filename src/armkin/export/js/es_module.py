@@ -42,6 +42,7 @@ _ARM_IS = """/** @type {{name: string, joints: number, branches: number, names: 
  *   reach: number, position: number, sums: number[][], offsets: number[], orientation: string, labels: string[]}} */"""
 _KEEP_OUT_IS = """/** @type {{thick: number[], solid: number, moving: number[][], shapes: {kind: number,
  *   numbers: number[]}[], crossings: number[][], pairs: string[][], clearance: number}} of segments [mm] */"""
+_OF_OTHERS = "ik, branch_names, ask, missOf, stood, told, nearestCopy"  # what families ask of the others' solver
 _SOLVER = ("numbers", "linear_algebra", "residual", "component", "singular", "surfaces", "ik", "closest")
 
 
@@ -107,11 +108,12 @@ def _module_with_one_held(arm: Arm, actual: Arm, redundant_joint: Redundancy) ->
         f"export const redundant = {_js_text(name)};",
         *_data_lines(arm, actual, task, redundant_joint.geometry, 0, has_motors),
         f"const REDUNDANT = {_js_text(redundant)};",
-        f"const OTHERS = (() => {{\n{other_module}return {{ ik, branch_names }};\n}})();",
+        f"const OTHERS = (() => {{\n{other_module}{part_text('held_branches')}\nreturn {{ {_OF_OTHERS} }};\n}})();",
         *_kinematics(actual, task),
         *_keep_outs(arm, actual),
         part_text("poses"),
         part_text("redundant").replace("@TARGET@", _target_text(task)),
+        part_text("families"),
         *([part_text("pulses")] if has_motors else []),
     ]
     return "\n".join(parts)

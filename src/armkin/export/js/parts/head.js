@@ -13,6 +13,8 @@
  * @property {number} residual_deg
  * @property {number | null} [clearance_mm] where the robot file or its scene has keep-outs: least distance of any pair, negative: a hit
  * @property {Hit[]} [hits] what it hits, the deepest first
+ * @property {{joint: string, interval: number[]}} [family] of an arm with a joint to spare: the interval of that joint [rad] along which the
+ *   family of this answer stays within limits
  * @property {number} motion sum of |change| from `near` [rad | mm]
  */
 /**

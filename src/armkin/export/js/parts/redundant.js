@@ -57,40 +57,63 @@ const others = new Float64Array(ARM.joints - 1); // of `near` all but the redund
  * @param {number[]} q of the others @param {number} held @returns {number[]} */
 const whole = (q, held) => (REDUNDANT.joint ? [...q, held] : [held, ...q]);
 
+/** The order of rows: within limits and free, within limits, others. @param {Branch} row */
+const rank = (row) => (row.within_limits ? (row.hits?.length ? 1 : 0) : 2);
+
+/**
+ * A row of the other joints as one of all, with the redundant one at a value.
+ * @param {Branch} row @param {number} value [rad] @param {ArrayLike<number>} near @param {boolean} within whether its limits allow it
+ */
+function finish(row, value, near, within) {
+  const j = REDUNDANT.joint;
+  const [low, high] = limits[j] ?? [null, null];
+  row.joints = whole(row.joints, value);
+  row.motion += Math.abs(value - near[j]);
+  if (!within) {
+    row.within_limits = false;
+    row.violations.push({ joint: names[j], value, lower: low, upper: high });
+  }
+  if (KEEPS_OUT) Object.assign(row, hitsOf(actual(row.joints)));
+  return row;
+}
+
 /**
  * All branches that reach a target while the redundant joint is held.
- * @param {Target} target @TARGET@
- * @param {ArrayLike<number>} [near] joint values to stay close to [rad | mm], by default home
- * @param {number} [held] where the redundant joint is held [rad], by default where `near` has it
- * @returns {Answer} branches within limits and free of hits first, then by motion from `near`; joints and motion [rad | mm]
+ * @param {Target} target @param {ArrayLike<number>} near @param {number} value where it is held [rad] @returns {Answer}
  */
-export function ik(target, near = home, held = near[REDUNDANT.joint]) {
+function held(target, near, value) {
   const j = REDUNDANT.joint;
-  if (near.length !== ARM.joints) actual(near); // refused with its own words
-  if (!Number.isFinite(held)) throw new RangeError(`${names[j]} cannot be held at ${held}: give one finite number`);
   for (let k = 0; k < others.length; k++) others[k] = near[k < j ? k : k + 1];
-  const answer = OTHERS.ik(moved(target, held * ARM.ratio[j]), others);
+  const answer = OTHERS.ik(moved(target, value * ARM.ratio[j]), others);
   const rows = answer.branches;
   const [low, high] = limits[j] ?? [null, null];
-  const within = held >= (low ?? -Infinity) - 1e-9 && held <= (high ?? Infinity) + 1e-9;
-  for (const row of rows) {
-    row.joints = whole(row.joints, held);
-    row.motion += Math.abs(held - near[j]);
-    if (!within) {
-      row.within_limits = false;
-      row.violations.push({ joint: names[j], value: held, lower: low, upper: high });
-    }
-    if (KEEPS_OUT) Object.assign(row, hitsOf(actual(row.joints)));
-  }
-  const rank = (/** @type {Branch} */ row) => (row.within_limits ? (row.hits?.length ? 1 : 0) : 2);
+  const within = value >= (low ?? -Infinity) - 1e-9 && value <= (high ?? Infinity) + 1e-9;
+  for (const row of rows) finish(row, value, near, within);
   if (KEEPS_OUT) rows.sort((/** @type {Branch} */ a, /** @type {Branch} */ b) => rank(a) - rank(b)); // of equal ones the order stays
   answer.best = rows.length && rank(rows[0]) === 0 ? 0 : null;
   if (rows.some((/** @type {Branch} */ row) => row.within_limits)) answer.closest = null;
   if (answer.closest) {
-    const joints = whole(answer.closest.joints, held);
+    const joints = whole(answer.closest.joints, value);
     answer.closest = { ...answer.closest, joints, position_mm: fk(joints).slice(0, 3).map((row) => row[3]) };
   }
   return answer;
+}
+
+/**
+ * All answers to a target: a row for each legal interval of a family of them, its posture nearest to `near`.
+ * @param {Target} target @TARGET@
+ * @param {ArrayLike<number>} [near] joint values to stay close to [rad | mm], by default home
+ * @param {number} [value] where the redundant joint is held instead [rad]; an arm without a closed form holds it in any case,
+ *   by default where `near` has it
+ * @returns {Answer} branches within limits and free of hits first, then by motion from `near`; joints and motion [rad | mm]
+ */
+export function ik(target, near = home, value = undefined) {
+  const j = REDUNDANT.joint;
+  for (const x of actual(near)) if (!Number.isFinite(x)) throw new RangeError('near holds a value that is not finite');
+  if (value === undefined && CLOSED_FORM) return families(target, near);
+  const own = value ?? near[j];
+  if (!Number.isFinite(own)) throw new RangeError(`${names[j]} cannot be held at ${own}: give one finite number`);
+  return held(target, near, own);
 }
 
 /** Names of all branches that a target may have. */

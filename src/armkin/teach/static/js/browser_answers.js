@@ -94,7 +94,8 @@ export function solving(arm, solver, scene) {
   function look({ q, target: wanted, branch = "", nearest = true, stands = null }) {
     const near = inwards(q);
     const goal = wanted ?? typed(near);
-    const found = arm.ik(wanted ? target(wanted) : arm.target(near), near);
+    const held = arm.redundant ? near[arm.names.indexOf(arm.redundant)] : undefined; // the page holds that joint
+    const found = arm.ik(wanted ? target(wanted) : arm.target(near), near, held);
     /** @type {import("./types.js").Branch[]} */
     const branches = found.branches.map((/** @type {any} */ row) => {
       const joints = outwards(row.joints);
