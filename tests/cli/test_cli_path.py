@@ -173,6 +173,9 @@ def test_send_follows_a_path_file_and_rounds_waypoints(pick: Path, tmp_path: Pat
     dry = run("send", THREE_DOF, "--path", pick, "--dry-run", "--json").json
     assert dry["length_mm"] == along.json["length_mm"]
     assert run("send", THREE_DOF, "1", "2", "3", "--path", pick, "--dry-run").code == 2
+    for option, value in (("--task", "pose"), ("--branch", "left"), ("--lock", "q1=0")):
+        refused = run("send", THREE_DOF, "--path", pick, option, value, "--dry-run")
+        assert refused == (2, "", f"error: --path and {option}: give one of them; armkin path has more options\n")
     rows = tmp_path / "rows.csv"
     rows.write_text("q1,q2,q3\n20,90,-90\n20,70,-90\n0,70,-90\n0,90,-90\n")
     stops = run("send", THREE_DOF, "--batch", rows, "--port", "sim", "--json").json

@@ -123,9 +123,8 @@ def send(
         from armkin.cli.boards.carry_out_path import send_path
 
         other_options = {"joint values": q, "--target": target, "--batch": batch, "--blend": blend, "--near": near}
-        arm = keep_outs.load_moving_arm(
-            _of_a_path(robot, {**other_options, "--accel": accel}), scene, ignore_keep_out, tool
-        )
+        other_options |= {"--branch": branch, "--task": task, "--lock": lock, "--accel": accel}
+        arm = keep_outs.load_moving_arm(_of_a_path(robot, other_options), scene, ignore_keep_out, tool)
         send_path(arm, path, link, speed, start, trace, dry_run=dry_run, json=json)
         return
     radius = _blend_radius(blend, batch)
