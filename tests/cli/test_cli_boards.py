@@ -67,6 +67,9 @@ def test_a_new_grbl_board_is_set_up_then_moved(grbl: str) -> None:
         assert {number: board.settings[number] for number in written} == pytest.approx(written)
         lost = run("send", grbl, -3, 85, -85, "--port", pty.name)
         assert (lost.code, "position is lost" in lost.err) == (5, True)
+        jog = run("jog", grbl, "q1", 1, "--port", pty.name)
+        assert (jog.code, jog.out, board.steps[0]) == (5, "", 0)
+        assert f"then armkin send {grbl} home --port {pty.name} --assume-home\n" in jog.err
         moved = run("send", grbl, -3, 85, -85, "--port", pty.name, "--assume-home", "--json")
         planned = armkin.pulses(armkin.load(grbl), np.deg2rad([-3, 85, -85])).tolist()
         assert moved.json["pulses"] == board.steps[:3] == planned

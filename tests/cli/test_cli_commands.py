@@ -127,6 +127,16 @@ def test_ik_branch_chooses() -> None:
     assert "left, elbow up" in unknown.err
 
 
+def test_all_branches_are_advised_where_they_are_not_listed_yet() -> None:
+    """Whether the limits or a keep-out refuse them."""
+    bench = ("--scene", "examples/scenes/three_dof.yaml")
+    for words in (("390", "80", "300", "--branch", "right"), ("300", "0", "-100", *bench)):
+        refused, listed = (run("ik", THREE_DOF, *words, *more) for more in ((), ("--all-branches",)))
+        assert (refused.code, listed.code) == (3, 3)
+        assert refused.err == f"{listed.err}  ik --all-branches lists all branches, also those outside limits\n"
+        assert "next" not in json.loads(run("ik", THREE_DOF, *words, "--all-branches", "--json").err)
+
+
 def test_ik_without_a_solution_shows_the_closest_pose() -> None:
     completed = run("ik", THREE_DOF, 900, 0, 0, "--json")
     answer = completed.json

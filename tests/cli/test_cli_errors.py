@@ -13,7 +13,7 @@ import pytest
 
 from armkin import errors
 from armkin.cli import advice
-from armkin.cli.app import load_command
+from armkin.cli.app import load_command, option_names
 from armkin.cli.commands import COMMANDS
 from command_line import run
 from source_trees import nodes_of
@@ -86,6 +86,10 @@ def test_without_an_error_notes_and_warnings_are_lines() -> None:
     assert completed.err.startswith("warning: q2 = 130 deg is outside")
 
 
+def command_line(*words: str) -> advice.CommandLine:
+    return advice.CommandLine([*words], option_names(words))
+
+
 def test_errors_survive_pickling() -> None:
     error = errors.RedundantArmError("too many", advice="hold one", joints=["J1"], surplus=1)
     again = pickle.loads(pickle.dumps(error))
@@ -95,7 +99,30 @@ def test_errors_survive_pickling() -> None:
 def test_a_program_reads_other_advice_than_a_terminal() -> None:
     error = errors.RedundantArmError("7 joints", advice="hold 1 with armkin.lock", joints=["J1", "J2"], surplus=1)
     assert str(error) == "7 joints: hold 1 with armkin.lock"
-    assert advice.message_with_advice(error).startswith("7 joints: fix 1 of J1, J2 with --lock JOINT=VALUE")
+    said = {name: advice.next_step(error, command_line(name)) for name in ("ik", "path", "reach", "nothing")}
+    assert said["path"] == "fix 1 of J1, J2 with --lock JOINT=VALUE"
+    assert said["ik"] == f"{said['path']}, or try values with --sweep JOINT=LOW:HIGH:COUNT"
+    assert said["reach"] == said["nothing"] == "ik --lock and Python's armkin.lock hold joints"
+    assert advice.message_with_advice(error, command_line("path")) == f"7 joints: {said['path']}"
+
+
+def test_what_is_advised_is_an_option_of_the_command() -> None:
+    """Whatever the error: a command that lacks an option is not told to take it."""
+    fields: dict[str, Any] = {
+        "joints": ["J1"], "surplus": 1, "robot_file": "three_dof", "port": "COM3", "homing": False, "process": 7,
+    }  # fmt: skip
+    needs = [{"needs": need} for need in ("blend", "task", "task pose", "other joint")]
+    cases: list[errors.ArmkinError] = [errors.UsageError("", **more) for more in needs]
+    cases += [
+        kind("", **fields) for kind in (errors.RedundantArmError, errors.PositionLostError, errors.UnfinishedError)
+    ]
+    for name in ("jog", "reach", "place", "workspace", "send", "path", "ik", "relax", "begin"):
+        for error in cases:
+            words = re.sub(
+                r"armkin \w+ [^,;]*|ik --lock", "", advice.next_step(error, command_line(name))
+            )  # other commands' options
+            named = {option.replace("--assume-home", "--assume") for option in re.findall(r"--[a-z-]+", words)}
+            assert named <= set(option_names([name])), (name, words)
 
 
 def test_every_kind_that_has_advice_is_raised_somewhere() -> None:

@@ -3,7 +3,7 @@
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import import_module
@@ -95,6 +95,13 @@ def load_command(name: str) -> Any:
     return typer.main.get_command(typer_app)
 
 
+def option_names(words: Sequence[str]) -> list[str]:
+    """The options of the command that a command line, without the program's name, begins with."""
+    if not words or words[0] not in COMMANDS:
+        return []
+    return [name for parameter in load_command(words[0]).params for name in parameter.opts]
+
+
 app = typer.Typer(cls=Commands, rich_markup_mode=None, context_settings=_SETTINGS, name="armkin")
 
 
@@ -129,17 +136,17 @@ def run(arguments: list[str]) -> int:
         arguments = [*arguments[1:2], "--help"]
     output.for_programs("--json" in arguments, [*arguments, os.environ.get("ARMKIN_PORT", "")])
     try:
-        code = _exit_code(lambda: _command_group()(arguments, prog_name="armkin", standalone_mode=False))
+        code = _exit_code(lambda: _command_group()(arguments, prog_name="armkin", standalone_mode=False), arguments)
         # The output of a failed command is kept, for example the rows of a batch before a malformed one.
-        return _exit_code(_flush_output) or code
+        return _exit_code(_flush_output, arguments) or code
     finally:
         output.flush()
         for number, handler in old_handlers.items():
             signal.signal(number, handler)
 
 
-def _exit_code(command: Callable[[], Any]) -> int:
-    """Run a command and return its exit code, errors told on stderr."""
+def _exit_code(command: Callable[[], Any], words: list[str]) -> int:
+    """Run a command and return its exit code, errors told on stderr; words: the command line."""
     try:
         return int(command() or 0)
     except (KeyboardInterrupt, typer.Abort):
@@ -150,7 +157,7 @@ def _exit_code(command: Callable[[], Any]) -> int:
     except Exception as error:
         from armkin.cli import exit_codes
 
-        return exit_codes.exit_code(error)
+        return exit_codes.exit_code(error, words, option_names)
 
 
 def _flush_output() -> None:

@@ -6,6 +6,7 @@ Imported before a command is: what has no memory, or no open files left, imports
 import errno
 import os
 import sys
+from collections.abc import Callable, Collection, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -34,13 +35,20 @@ class ClosedPipe(Exception):  # noqa: N818 - no error
     """The reader of standard output has closed the pipe. (Typer would end the process with 1 for the OSError.)"""
 
 
-def exit_code(error: BaseException) -> int:
-    """Say on stderr why the command fails; its exit code."""
+def exit_code(
+    error: BaseException, words: Sequence[str], option_names: Callable[[Sequence[str]], Collection[str]]
+) -> int:
+    """Say on stderr why the command fails; its exit code.
+
+    words: the command line, without the program's name; option_names: gives the options of its command.
+    """
     if isinstance(error, errors.ArmkinError):
         from armkin.cli import advice
 
         code = next(code for kind, code in EXIT_CODES.items() if isinstance(error, kind))
-        output.error(advice.message_with_advice(error), error.kind, code, error.fields, advice.next_step(error))
+        line = advice.CommandLine(words, option_names(words))
+        message, step = advice.message_with_advice(error, line), advice.next_step(error, line)
+        output.error(message, error.kind, code, error.fields, step)
         return code
     if isinstance(error, ClosedPipe):
         return _closed_pipe()

@@ -167,8 +167,9 @@ def _without_lock(language: str) -> Iterator[None]:
     try:
         yield
     except RedundantArmError as error:
-        advice = "ik --lock and Python's armkin.lock hold joints"
-        raise UsageError(f"{error.message}: no {language} for that; {advice}") from None
+        from armkin.cli.advice import HOLD_JOINTS
+
+        raise UsageError(f"{error.message}: no {language} for that; {HOLD_JOINTS}") from None
 
 
 def _write_c(arm: Arm, task: str | None, single: bool, out: str | None) -> None:
