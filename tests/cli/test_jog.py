@@ -32,3 +32,8 @@ def test_a_board_of_another_file_is_told_by_send_where_the_arm_stands(tmp_path: 
         assert f"\n  put the arm in its home pose, then {advised}\n" in refused.err
         assert run(*advised.split()[1:]).code == 0
         assert run(*jog).code == 0
+
+
+def test_the_help_says_which_boards_jog_while_the_position_is_lost() -> None:
+    text = " ".join(run("jog", "--help").out.split())
+    assert "boards with armkin's firmware move while the position is lost, too, at an eighth of max_speed" in text

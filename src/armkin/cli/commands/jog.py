@@ -33,8 +33,9 @@ def jog(
 ) -> None:
     """Move one joint at a constant speed, for a short time.
 
-    For setting up: it also works while the position is lost, at an eighth of max_speed. The board stops by
-    itself when this command is gone, and before the joint limits and keep-outs if the position is known.
+    For setting up: boards with armkin's firmware move while the position is lost, too, at an eighth of max_speed.
+    The board stops by itself when this command is gone, and before the joint limits and keep-outs if the position
+    is known.
     """
     from armkin.board.planner import where_arm_stands
     from armkin.model.lock_joints import joint_index
