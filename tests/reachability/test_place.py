@@ -292,3 +292,12 @@ def test_bad_input_is_told(tmp_path: Path) -> None:
     assert run("place", "three_dof").code == 2
     assert run("place", "three_dof", tmp_path / "none.csv").code == 1
     assert "cannot read the path file" in run("place", "three_dof", tmp_path / "path.yaml").err
+
+
+@pytest.mark.parametrize("name", ["examples/first_layer.gcode", "none.NC", "none.ngc", "none.gco", "none.svg"])
+def test_a_drawing_is_no_table_of_targets(name: str) -> None:
+    refused = run("place", "three_dof", name)
+    assert (refused.code, refused.out) == (2, "")
+    assert refused.err == (
+        f"error: {name}: place takes targets (CSV) or a path (YAML); a drawing does not say where its zero lies\n"
+    )

@@ -62,8 +62,13 @@ def place(
     if len(words) < 2:
         raise UsageError("place takes robots, then a file of targets or a path: armkin place ur5e targets.csv")
     from armkin.engines.ordered_chunks import Engine
+    from armkin.path_file import drawing_language
     from armkin.reachability.place.place_file import write
 
+    if drawing_language(words[-1]):
+        raise UsageError(
+            f"{words[-1]}: place takes targets (CSV) or a path (YAML); a drawing does not say where its zero lies"
+        )
     arms = [arguments.load_arm(word) for word in words[:-1]]
     settings = _grid_settings(step, z, yaw, area)
     robot_places = _search_places(arms, words[-1], settings, scene, out, Engine(workers, cluster), compiled=compiled)
