@@ -40,6 +40,7 @@ def error_of(*words: object, stdin: bytes = b"") -> dict[str, Any]:
         (("fk", DOF, 1, 2, 3, "--jsn"), {"kind": "usage", "exit_code": 2}),
         (("fq",), {"kind": "usage", "exit_code": 2}),
         (("ik", "panda", 1, 2, 3, "--task", "xyz"), {"kind": "redundant_arm", "exit_code": 2, "surplus": 4}),
+        (("send", DOF, 0, 500, 0, "--port", "sim"), {"joint": "q2", "value": 500.0}),  # as typed: 500.00000000000006
         (("send", DOF, 0, 121, 0, "--port", "sim"), {"kind": "no_solution", "joint": "q2", "value": 121, "upper": 120}),
         (("send", DOF, 0, 0, 0, "--port", "/no/port"), {"kind": "link", "exit_code": 5}),
         (("fk", DOF, "--batch", "-", "--out", "/no/such/folder/x"), {"kind": "file", "exit_code": 1}),

@@ -40,6 +40,11 @@ def joints_out(arm: Arm, q: ArrayLike) -> Array:
     return np.asarray(q, dtype=float) / joint_scale(arm) + 0.0  # + 0.0 turns -0.0 into 0.0
 
 
+def joint_out(arm: Arm, joint: int, value: float) -> float:
+    """One joint value from [rad | mm] to [deg | mm], with the fewest digits that give it: as it was typed."""
+    return _shortest_number(float(value), float(joint_scale(arm)[joint]))
+
+
 def limits_out(arm: Arm) -> list[tuple[float, float]]:
     """Limits of each joint [deg | mm], as in the robot file: 120 instead of 119.99999999999999."""
     return list(_limits_out(arm))
