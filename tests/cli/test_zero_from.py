@@ -151,3 +151,33 @@ def test_with_a_port_the_file_is_compared_with_the_servos(calibration: Path, tmp
         refused = run("zero", "so101", "--from", calibration, "--port", pty.name, "-o", mine)
     assert (refused.code, refused.out, mine.exists()) == (5, "", False)
     assert "servo 3 (elbow_flex): its homing offset (register 31) is -985, the file says -986" in refused.err
+
+
+def test_a_pose_that_leaves_home_outside_its_limits_is_refused_with_what_is_allowed(
+    calibration: Path, tmp_path: Path
+) -> None:
+    """The limits move with the pose: such a file would be none, with or without --out."""
+    mine = tmp_path / "mine.yaml"
+    for more in ((), ("-o", mine)):
+        refused = run("zero", "so101", "--from", calibration, "--pose", "500,0,0,0,0", *more, "--json")
+        answer = json.loads(refused.err)
+        assert (refused.code, refused.out, mine.exists()) == (2, "", False)
+        assert answer["error"] == (
+            "--pose: shoulder_pan at 500 deg in the middle of its range makes its limits 379.985 to "
+            "620.015 deg, and its pose home is at 0: the middle must be from -120.015 to 120.015 deg"
+        )
+        assert (answer["joint"], answer["middle"]) == ("shoulder_pan", 500)
+        assert (answer["lower"], answer["upper"]) == pytest.approx((-120.0146, 120.0146), abs=1e-4)
+    allowed = run("zero", "so101", "--from", calibration, "--pose", "120,0,0,0,0", "-o", mine)
+    assert (allowed.code, mine.exists()) == (0, True)
+
+
+def test_a_named_pose_outside_the_new_limits_is_told(calibration: Path, tmp_path: Path) -> None:
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(Path("robots/so101.yaml").read_text() + "poses: {high: [0, 0, 95, 0, 0]}\n")
+    write_changed(calibration, "elbow_flex", range_min=1500, range_max=2500)
+    refused = run("zero", robot, "--from", calibration, "-o", tmp_path / "mine.yaml")
+    assert (refused.code, (tmp_path / "mine.yaml").exists()) == (2, False)
+    assert "elbow_flex at 0 deg in the middle of its range makes its limits -43.9453 to 43.9453 deg" in refused.err
+    assert "its pose high is at 95: the middle must be from 51.0547 to 138.945 deg" in refused.err
+    assert "--pose NAME|Q,... says it" in refused.err

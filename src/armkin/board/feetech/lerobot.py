@@ -17,7 +17,7 @@ import numpy as np
 from armkin.board.feetech import registers
 from armkin.board.feetech.registers import COUNTS_PER_TURN
 from armkin.errors import FileError, LinkError, UsageError
-from armkin.model.units import DEGREE
+from armkin.model.units import DEGREE, joint_out, poses_out
 
 if TYPE_CHECKING:
     from armkin.board.feetech.feetech_machine import ServoMachine
@@ -127,6 +127,7 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
         counts_per_degree = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
         zero_count = motor.middle - counts_per_degree * float(middle[joint]) / DEGREE
         low, high = sorted((count - zero_count) / counts_per_degree for count in (motor.range_min, motor.range_max))
+        _check_poses(arm, joint, joint_out(arm, joint, middle[joint]), (low, high))
         motors.append(motor)
         zero.append(zero_count)
         limits.append((low, high))
@@ -164,6 +165,24 @@ def _check_middle(arm: Arm, joint: int) -> None:
             advice="say which pose the middles of all ranges are",
             joint=arm.joint_names[joint],
             middle=middle,
+        )
+
+
+def _check_poses(arm: Arm, joint: int, middle: float, limits: tuple[float, float]) -> None:
+    """Raise UsageError if a pose of the robot file, home first, is outside a joint's new limits; all in [deg]."""
+    name, (low, high) = arm.joint_names[joint], limits
+    for pose, values in poses_out(arm).items():
+        value = values[joint]
+        if round(low, 6) <= value <= round(high, 6):  # as they are written
+            continue
+        lower, upper = value + low - middle, value + high - middle
+        raise UsageError(
+            f"{name} at {middle:g} deg in the middle of its range makes its limits {low:g} to {high:g} deg, and "
+            f"its pose {pose} is at {value:g}: the middle must be from {lower:g} to {upper:g} deg",
+            joint=name,
+            middle=middle,
+            lower=lower,
+            upper=upper,
         )
 
 

@@ -41,6 +41,8 @@ def record_zeros(
     try:
         calibration = board.calibration(path, q)
     except UsageError as error:
+        if "middle" in error.fields and pose is not None:
+            raise error.within("--pose") from None
         if "middle" in error.fields:
             error.advice = "the middles of all ranges are another pose: --pose NAME|Q,... says it"
         raise
