@@ -110,6 +110,34 @@ def test_roots_that_solutions_share_are_taken_apart(tmp_path: Path) -> None:
     assert json.loads(completed.stdout) == [False] * len(q)
 
 
+_MALFORMED = """
+import * as arm from './arm.mjs';
+const told = [];
+for (const name of ['ik', 'fk', 'jacobian', 'target', 'clearance', 'pulses', 'joints'])
+  for (const given of [[null], [undefined], [], [5], [[null]], [arm.target(arm.home), null]])
+    if (arm[name] && (name === 'ik' || given.length < 2))
+      try {
+        told.push([name, 'answer', String(arm[name](...given))]);
+      } catch (error) {
+        told.push([name, error.name, error.message]);
+      }
+console.log(JSON.stringify(told));
+"""
+
+
+@pytest.mark.parametrize("name", ["three_dof", "ur5e", "panda"])
+def test_what_is_malformed_throws_a_range_error_that_says_what_was_expected(name: str, tmp_path: Path) -> None:
+    arm = armkin.load(name)
+    (tmp_path / "arm.mjs").write_text(module_text(arm), encoding="utf-8")
+    (tmp_path / "malformed.mjs").write_text(_MALFORMED)
+    completed = subprocess.run(["node", "malformed.mjs"], cwd=tmp_path, check=True, capture_output=True, text=True)
+    told = json.loads(completed.stdout)
+    expected = ("a target is ", f"{name} has {arm.n} joints", f"{name} has {arm.n} motors", "cannot be held")
+    assert [row for row in told if row[1] != "RangeError" or not any(words in row[2] for words in expected)] == []
+    assert not [row for row in told if "undefined values" in row[2] or "null" in row[2]]
+    assert {row[0] for row in told} >= {"ik", "fk", "jacobian", "target"}
+
+
 SINGULAR: dict[str, list[list[float]]] = {
     "thor": [
         [135, 0, 0, 0, -135, 180],  # the elbow stretched over the base: a self-motion of double roots

@@ -20,9 +20,9 @@ function read(target) {
   const wanted = ARM.orientation === 'full' ? 16 : ARM.labels.length;
   let count = 0;
   const flat = givenNumbers;
-  for (let i = 0; i < target.length; i++) {
+  for (let i = 0; i < target?.length; i++) {
     const row = target[i];
-    const numbers = typeof row === 'number' ? 1 : row.length;
+    const numbers = typeof row === 'number' ? 1 : row?.length;
     for (let j = 0; j < numbers; j++, count++) if (count < wanted) flat[count] = typeof row === 'number' ? row : row[j];
   }
   if (count !== wanted)

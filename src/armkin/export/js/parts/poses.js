@@ -4,7 +4,7 @@ const slopes = new Float64Array(6 * ARM.joints);
 /** Actual joint values of commanded ones, which calibration tells apart.
  * @template {number[] | Float64Array} T @param {ArrayLike<number>} q @param {T} out @returns {T} */
 function actual(q, out = /** @type {T} */ (new Array(ARM.joints))) {
-  if (q.length !== ARM.joints) throw new RangeError(`${ARM.name} has ${ARM.joints} joints, ${names.join(' ')}; got ${q.length} values`);
+  if (q?.length !== ARM.joints) throw new RangeError(`${ARM.name} has ${ARM.joints} joints, ${names.join(' ')}; got ${q?.length ?? 'no'} values`);
   for (let j = 0; j < ARM.joints; j++) out[j] = q[j] * ARM.ratio[j];
   return out;
 }

@@ -16,6 +16,6 @@ export function pulses(q) {
 
 /** Joint values where the motors stand at these pulses [rad | mm]. @param {ArrayLike<number>} p @returns {number[]} */
 export function joints(p) {
-  if (p.length !== MOTORS.bias.length) throw new RangeError(`${ARM.name} has ${MOTORS.bias.length} motors, got ${p.length} pulses`);
+  if (p?.length !== MOTORS.bias.length) throw new RangeError(`${ARM.name} has ${MOTORS.bias.length} motors, got ${p?.length ?? 'no'} pulses`);
   return MOTORS.inverse.map((row, j) => home[j] + row.reduce((sum, x, m) => sum + x * (p[m] - MOTORS.bias[m]), 0));
 }

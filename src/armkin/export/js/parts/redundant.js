@@ -28,10 +28,10 @@ function moved(target, t) {
   const given = givenPose;
   const wanted = full ? 16 : ARM.labels.length;
   let count = 0;
-  for (let i = 0; i < target.length; i++) {
+  for (let i = 0; i < target?.length; i++) {
     const row = target[i];
     if (typeof row === 'number') given[count++] = row;
-    else for (let k = 0; k < row.length; k++) given[count++] = row[k]; // an array of 16 keeps no more
+    else for (let k = 0; k < row?.length; k++) given[count++] = row[k]; // an array of 16 keeps no more
   }
   if (count !== wanted) return target; // refused with its own words
   undo(t);
