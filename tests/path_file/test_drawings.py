@@ -11,6 +11,7 @@ import armkin
 from armkin.errors import FileError, UsageError
 from command_line import ROOT, run
 
+GCODE = "G-code: files that end in .gcode, .gco, .nc or .ngc"
 SVG = ROOT / "examples" / "drawing.svg"
 
 
@@ -39,3 +40,21 @@ def test_what_it_does_not_take_is_said(name: str, place: list[float], error: Any
 def test_a_drawing_without_a_place_names_the_function() -> None:
     with pytest.raises(UsageError, match=r"armkin\.drawing\(arm, file, at\)"):
         armkin.path(armkin.load("three_dof"), SVG)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("d.nc", "--at", "350,0,200", "--lift", "4"), "--lift belongs to SVG: files that end in .svg"),
+        (("d.svg", "--at", "350,0,200", "--grip-by", "M3"), f"--grip-by belongs to {GCODE}"),
+        (("d.yaml", "--grip-by", "M3"), f"--grip-by belongs to {GCODE}"),
+        (
+            ("d.csv", "--feed", "3"),
+            "--feed belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg",
+        ),
+        (("--via", "390,80,300", "--lift", "4"), "--lift belongs to SVG: files that end in .svg"),
+    ],
+)
+def test_an_option_of_another_language_is_refused(words: tuple[str, ...], says: str) -> None:
+    """Before the file is read: what is ignored is no answer."""
+    assert run("path", "three_dof", *words) == (2, "", f"error: {says}\n")

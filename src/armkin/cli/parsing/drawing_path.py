@@ -29,6 +29,13 @@ GripBy = Annotated[
 ]
 
 
+_ALL_LANGUAGES = (("gcode", "svg"), "G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
+_LANGUAGES = {  # of the options that one language alone has
+    "lift": (("svg",), "SVG: files that end in .svg"),
+    "grip_by": (("gcode",), "G-code: files that end in .gcode, .gco, .nc or .ngc"),
+}
+
+
 class Placement(NamedTuple):
     """Where and how a drawing is drawn: the options as they are given."""
 
@@ -44,10 +51,9 @@ def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Place
     from armkin import path_file
     from armkin.motion.drawing_to_path import drawing
 
-    if file is None or path_file.drawing_language(file) is None:
-        if given_names := [name for name, value in placement._asdict().items() if value is not None]:
-            option = "--" + given_names[0].replace("_", "-")
-            raise UsageError(f"{option} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
+    language = None if file is None else path_file.drawing_language(file)
+    _check_language(language, placement)
+    if file is None or language is None:
         return None
     at, scale, feed, lift, grip_by = placement
     if at is None:
@@ -63,6 +69,14 @@ def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Place
     for text in moves.notes:
         output.note(text)
     return moves
+
+
+def _check_language(language: str | None, placement: Placement) -> None:
+    """Raise UsageError for an option that a file of this language (None: no drawing) would ignore."""
+    for name, value in placement._asdict().items():
+        languages, words = _LANGUAGES.get(name, _ALL_LANGUAGES)
+        if value is not None and language not in languages:
+            raise UsageError(f"--{name.replace('_', '-')} belongs to {words}")
 
 
 def _bounded_number(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:
