@@ -13,6 +13,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 from pydantic_core import PydanticCustomError
 
 from armkin import board_catalogue
+from armkin.errors import UsageError
 from armkin.robot_file.key_types import Angle, Length, Model
 
 MAX_JOINTS = 12
@@ -229,6 +230,12 @@ class Gripper(Drive):
     )
     max_speed: Rate | None = Field(None, description="deg/s or mm/s of the drive; needed to grip.")
     max_accel: Rate | None = Field(None, description="deg/s2 or mm/s2 of the drive; needed to grip.")
+
+    def check_value(self, value: float) -> None:
+        """Raise UsageError for a value, in the drive's units, that is not from open to closed."""
+        low, high = sorted((self.open, self.closed))
+        if not low <= value <= high:
+            raise UsageError(f"grip: {value:g} is outside of the gripper's {low:g} to {high:g}")
 
 
 class Homing(Model):

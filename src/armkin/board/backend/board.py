@@ -268,10 +268,8 @@ class Board(ABC):
     def grip_value(self, value: str | float) -> float:
         """The target value of the gripper: open, closed, or a value between them. Raises UsageError for others."""
         gripper = self.gripper()
-        low, high = sorted((gripper.open, gripper.closed))
         target = {"open": gripper.open, "closed": gripper.closed}[value] if isinstance(value, str) else value
-        if not low <= target <= high:
-            raise UsageError(f"grip: {target:g} is outside of the gripper's {low:g} to {high:g}")
+        gripper.check_value(target)
         return target
 
     def check_grip(self, value: str | float) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -15,6 +15,7 @@ class Grip:
     """The gripper as an axis."""
 
     axis: int
+    drive: Gripper  # of the robot file
     open: int  # counts
     closed: int
     top: float | None  # counts/s, None if the file has no max_speed
@@ -43,6 +44,7 @@ def as_axis(axis: int, gripper: Gripper) -> Grip:
     top, accel = gripper.max_speed, gripper.max_accel
     base = Grip(
         axis=axis,
+        drive=gripper,
         open=0,
         closed=0,
         top=None if top is None else top * abs(per_unit),
@@ -50,12 +52,4 @@ def as_axis(axis: int, gripper: Gripper) -> Grip:
         per_unit=per_unit,
         at_zero=zero,
     )
-    return Grip(
-        axis=axis,
-        open=base.count(gripper.open),
-        closed=base.count(gripper.closed),
-        top=base.top,
-        accel=base.accel,
-        per_unit=per_unit,
-        at_zero=zero,
-    )
+    return replace(base, open=base.count(gripper.open), closed=base.count(gripper.closed))

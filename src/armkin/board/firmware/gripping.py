@@ -32,9 +32,8 @@ def count_of(gripper: Grip, value: str | float) -> int:
         return counts_by_name[value]
     count = gripper.count(value)
     low, high = sorted(counts_by_name.values())
-    if not low <= count <= high:
-        ends = sorted((gripper.value(low), gripper.value(high)))
-        raise UsageError(f"grip: {value:g} is outside of the gripper's {ends[0]:g} to {ends[1]:g}")
+    if not low <= count <= high:  # the value of the nearest count, which is printed, may be typed again
+        gripper.drive.check_value(value)
     return count
 
 

@@ -207,9 +207,7 @@ class FirmwareBoard(Board):
         target = gripping.count_of(grip, value)
         gripping.prepare_gripper(self.machine, grip, None if assume is None else gripping.count_of(grip, assume))
         position = gripping.move_gripper(self.machine, grip, target)
-        drive = self.arm.gripper
-        assert drive is not None
-        units_of = "deg" if drive.lead is None else "mm", "us" if drive.kind == "servo" else "steps"
+        units_of = "deg" if grip.drive.lead is None else "mm", "us" if grip.drive.kind == "servo" else "steps"
         return Gripped(grip.value(position), grip.value(target), units_of[0], position, units_of[1])
 
 

@@ -126,8 +126,5 @@ def check_grip(arm: Arm, value: str | float) -> None:
     """Raise UsageError for an arm without a gripper, and for a value beyond open and closed of its robot file."""
     if arm.gripper is None:
         raise UsageError(f"grip: {arm.name} has no gripper; add gripper: to its robot file")
-    if isinstance(value, str):
-        return
-    low, high = sorted((arm.gripper.open, arm.gripper.closed))
-    if not low <= value <= high:
-        raise UsageError(f"grip: {value:g} is outside of the gripper's {low:g} to {high:g}")
+    if not isinstance(value, str):
+        arm.gripper.check_value(value)
