@@ -12,6 +12,7 @@ import pytest
 import armkin
 
 ARM = armkin.load("three_dof")
+PLAN = armkin.path(ARM, [[390.0, 80.0, 300.0], [390.0, 100.0, 300.0]])
 
 
 @pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda arm: pickle.loads(pickle.dumps(arm))])
@@ -42,6 +43,11 @@ def test_solutions_share_no_memory_with_the_callers_arrays() -> None:
         lambda: armkin.unlock(ARM, {"q1": "x"}, [1.0, 2.0]),  # type: ignore[dict-item]
         lambda: armkin.unlock(ARM, {"q1": 0.0}, 1.0),
         lambda: armkin.turns(ARM, [1.0, 2.0]),
+        lambda: armkin.load(b"three_dof"),  # type: ignore[arg-type]
+        lambda: armkin.load(None),  # type: ignore[arg-type]
+        lambda: PLAN.q("a"),
+        lambda: PLAN.qdd([1, [2, 3]]),  # type: ignore[arg-type]
+        lambda: PLAN.s("a"),
     ],
 )
 def test_what_does_not_fit_is_a_usage_error(call: Callable[[], object]) -> None:

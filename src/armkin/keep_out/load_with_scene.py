@@ -33,6 +33,7 @@ def load(
     Raises:
         FileError: a file cannot be read.
         RobotFileError: a file is not valid, or a keep-out is hit in every posture.
+        UsageError: path is neither text nor path-like.
 
     >>> load("three_dof").joint_names
     ('q1', 'q2', 'q3')

@@ -21,7 +21,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from armkin.errors import FileError, RobotFileError
+from armkin.errors import FileError, RobotFileError, UsageError
 from armkin.robot_file import catalogue, strict_yaml
 from armkin.robot_file.robot import RobotFile
 from armkin.robot_file.robot_keys import DH, Board, Drive, Gripper, Homing, Joint, Motor, Pose, Screw
@@ -50,8 +50,10 @@ def read_robot_file(path: str | os.PathLike[str]) -> RobotFile:
     """Read and validate a robot file, given its path or the name of a shipped robot.
 
     Raises FileError if it cannot be read, RobotFileError (``file:line: what; what is allowed``) if it
-    is not valid.
+    is not valid, UsageError for what is no path.
     """
+    if not isinstance(path, str | os.PathLike):
+        raise UsageError(f"a robot is a path or a name, of type str or os.PathLike; got {type(path).__name__}")
     name = os.fspath(path)
     try:
         with Path(catalogue.locate(name)).open("rb") as file:

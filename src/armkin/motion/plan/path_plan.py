@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, real_array
 from armkin.forward import condition, jacobian
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, joint_path
@@ -229,7 +229,7 @@ class PathPlan:
         Returns:
             (...) [mm].
         """
-        times = np.asarray(t, dtype=float).ravel()
+        times = real_array(t, "t").ravel()
         lengths = np.zeros(len(times))
         numbers = sorted(self.on_path)
         begins = self.motion.begins[numbers]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import UsageError
-from armkin.formula.arrays import Array
+from armkin.formula.arrays import Array, real_array
 from armkin.forward import frames
 from armkin.motion.timing.profile import Profile
 
@@ -187,7 +187,7 @@ class Trajectory:
         return Trace(np.concatenate(times), q, frames(self.arm, q)[..., :3, 3])
 
     def _evaluate(self, t: ArrayLike, derivative: int) -> Array:
-        times = np.clip(np.asarray(t, dtype=float), 0.0, self.duration)
+        times = np.clip(real_array(t, "t"), 0.0, self.duration)
         flat_times = times.ravel()
         values = np.tile(self.start if derivative == 0 else np.zeros(self.arm.n), (len(flat_times), 1))
         numbers = np.searchsorted(self.begins, flat_times, side="right") - 1
