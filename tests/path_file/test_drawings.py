@@ -11,7 +11,6 @@ import armkin
 from armkin.errors import FileError, UsageError
 from command_line import ROOT, run
 
-GCODE = "G-code: files that end in .gcode, .gco, .nc or .ngc"
 SVG = ROOT / "examples" / "drawing.svg"
 
 
@@ -45,16 +44,26 @@ def test_a_drawing_without_a_place_names_the_function() -> None:
 @pytest.mark.parametrize(
     ("words", "says"),
     [
-        (("d.nc", "--at", "350,0,200", "--lift", "4"), "--lift belongs to SVG: files that end in .svg"),
-        (("d.svg", "--at", "350,0,200", "--grip-by", "M3"), f"--grip-by belongs to {GCODE}"),
-        (("d.yaml", "--grip-by", "M3"), f"--grip-by belongs to {GCODE}"),
-        (
-            ("d.csv", "--feed", "3"),
-            "--feed belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg",
-        ),
-        (("--via", "390,80,300", "--lift", "4"), "--lift belongs to SVG: files that end in .svg"),
+        (("d.yaml", "--grip-by", "M3"), "--grip-by belongs to"),
+        (("d.csv", "--feed", "3"), "--feed belongs to"),
+        (("--via", "390,80,300", "--lift", "4"), "--lift belongs to"),
     ],
 )
-def test_an_option_of_another_language_is_refused(words: tuple[str, ...], says: str) -> None:
-    """Before the file is read: what is ignored is no answer."""
-    assert run("path", "three_dof", *words) == (2, "", f"error: {says}\n")
+def test_an_option_of_drawings_is_refused_without_one(words: tuple[str, ...], says: str) -> None:
+    """Before the file is read."""
+    files = "G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg"
+    assert run("path", "three_dof", *words) == (2, "", f"error: {says} {files}\n")
+
+
+def test_an_option_of_the_other_language_is_noted(tmp_path: Path) -> None:
+    drawing, line = tmp_path / "d.nc", tmp_path / "d.svg"
+    drawing.write_text("G1 X0 Y0 F600\nG1 X5\n")
+    line.write_text('<svg width="10mm" height="10mm"><path d="M 0 0 L 5 0"/></svg>')
+    for file, option, says in (
+        (drawing, ("--lift", 4), "it belongs to SVG"),
+        (line, ("--grip-by", "M3"), "G-code alone"),
+    ):
+        completed = run("path", "three_dof", file, "--at", "350,0,200", "--feed", 20, *option)
+        assert completed.code == 0
+        assert f"{option[0]} is ignored: " in completed.err
+        assert says in completed.err

@@ -29,11 +29,7 @@ GripBy = Annotated[
 ]
 
 
-_ALL_LANGUAGES = (("gcode", "svg"), "G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
-_LANGUAGES = {  # of the options that one language alone has
-    "lift": (("svg",), "SVG: files that end in .svg"),
-    "grip_by": (("gcode",), "G-code: files that end in .gcode, .gco, .nc or .ngc"),
-}
+_OF_ONE_LANGUAGE = {"lift": ("svg", "SVG alone: G-code lifts by its own words"), "grip_by": ("gcode", "G-code alone")}
 
 
 class Placement(NamedTuple):
@@ -72,11 +68,14 @@ def drawing_moves(arm: Arm, file: str | None, task: str | None, placement: Place
 
 
 def _check_language(language: str | None, placement: Placement) -> None:
-    """Raise UsageError for an option that a file of this language (None: no drawing) would ignore."""
-    for name, value in placement._asdict().items():
-        languages, words = _LANGUAGES.get(name, _ALL_LANGUAGES)
-        if value is not None and language not in languages:
-            raise UsageError(f"--{name.replace('_', '-')} belongs to {words}")
+    """Raise UsageError for an option that is of drawings, where there is none (None); note one of another language."""
+    for name in [name for name, value in placement._asdict().items() if value is not None]:
+        option = f"--{name.replace('_', '-')}"
+        if language is None:
+            raise UsageError(f"{option} belongs to G-code and SVG: files that end in .gcode, .gco, .nc, .ngc or .svg")
+        own_language, words = _OF_ONE_LANGUAGE.get(name, (language, ""))
+        if language != own_language:
+            output.note(f"{option} is ignored: it belongs to {words}")
 
 
 def _bounded_number(text: str, option: str, bounds: tuple[float, float], allowed: str) -> float:
