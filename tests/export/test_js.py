@@ -304,6 +304,7 @@ def test_without_a_held_joint_the_module_lists_families(
     near = np.where(np.arange(count)[:, None] % 2, q, arm.home)
     answers = ask_module(arm, tmp_path, q, near=near, targets=targets, task=task)["ik"]
     s = armkin.ik(arm, targets, task, near=near)
+    assert s.interval is not None
     same = 0
     for k, answer in enumerate(answers):
         rows = [row for row in answer["branches"] if row["within_limits"]]

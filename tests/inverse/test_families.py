@@ -79,6 +79,7 @@ def test_a_row_is_at_its_interval_s_end_where_that_is_nearest(x_y: tuple[float, 
     """Where two branches merge one goes away from near, whatever it does farther on; by the law of cosines."""
     arm = armkin.load("planar_3dof")
     solutions = armkin.ik(arm, np.array(x_y), "xy")
+    assert solutions.interval is not None
     assert solutions.valid.sum() >= 2
     for branch in np.flatnonzero(solutions.valid).tolist():
         low, high = solutions.interval[branch]
