@@ -18,6 +18,8 @@ from armkin.board.sim.segment_queue import intervals
 from armkin.formula.arrays import Array
 from armkin.motion.timing.curved_stretch import Curve
 
+_SOLVED = 1e-9  # of a target [mm]: what `ik` leaves of it
+
 
 def some_path(seed: int) -> dict[str, object]:
     """Lines, a spline and an arc through points at random, some with rounded corners."""
@@ -44,6 +46,28 @@ def test_a_path_at_random_arrives_at_exact_counts(seed: int) -> None:
     follow_plan(board, plan, laid, lambda done, total: None)
     assert machine.counts() == tuple(laid[-1].end.tolist())
     assert sum(part.segments for part in laid) < 100 * plan.duration + 50
+
+
+@pytest.mark.parametrize("jerk", [100, 200])  # [deg/s3]
+def test_a_line_of_so_little_jerk_that_every_chord_may_be_long_is_carried_out(jerk: float) -> None:
+    """No sample's chord needed a look: `evaluate` was asked for no time at all, and could not tell rows of none."""
+    arm = armkin.load("three_dof")
+    board = board_of(arm)
+    begin, end = np.array([390.0, 80, 300]), np.array([390.0, -80, 200])
+    path = {"start": {"point": begin.tolist()}, "moves": [{"line": end.tolist()}]}
+    plan = armkin.path(arm, path, jerk=np.deg2rad(jerk))
+    t = np.linspace(0.0, plan.duration, 20_001)
+    third = np.diff(plan.qd(t), n=2, axis=0) / (plan.duration / 20_000) ** 2
+    assert np.abs(third).max() <= 1.001 * np.deg2rad(jerk)
+    offset, way = armkin.fk(arm, plan.q(t))[:, :3, 3] - begin, (end - begin) / np.linalg.norm(end - begin)
+    assert np.linalg.norm(offset - (offset @ way)[:, None] * way, axis=1).max() <= plan.tolerance
+    assert offset[[0, -1]] == pytest.approx(np.array([begin, end]) - begin, abs=_SOLVED)
+    machine = board.connect(board.simulated())
+    machine.prepare()
+    laid = plan_parts(plan, machine.counts(), machine.plan_trajectory)
+    follow_plan(board, plan, laid, lambda done, total: None)
+    assert machine.counts() == tuple(laid[-1].end.tolist())
+    assert machine.counts() == tuple(armkin.pulses(arm, plan.q(plan.duration)).tolist())
 
 
 @pytest.mark.parametrize("seed", range(6))

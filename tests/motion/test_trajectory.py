@@ -10,6 +10,9 @@ from hypothesis import strategies as st
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm, from_links
 from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.curved_stretch import Curve
+from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.profile import trapezoid
 from armkin.motion.timing.trajectory import Straight
 
@@ -52,6 +55,15 @@ def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None
     assert trajectory.q(trajectory.begins) == pytest.approx(np.vstack([three_dof.home, goals]))
     assert trajectory.q([[-1.0, trajectory.duration + 1]]) == pytest.approx(np.array([[three_dof.home, goals[-1]]]))
     assert trajectory.q(0.5).shape == (3,)
+
+
+def test_no_times_have_no_rows(three_dof: Arm) -> None:
+    path = Knots(np.array([0.0, 1.0]), np.stack([three_dof.home, three_dof.home + 0.1]), np.full((2, 3), 0.1))
+    curve = Curve(path, np.ones(2))
+    straight = Straight(three_dof.home, three_dof.home + 0.1, trapezoid(1.0, 1.0, 1.0))
+    for stretch in (straight, curve, Smoothed(curve, 0.5)):
+        for derivative in range(3):
+            assert stretch.evaluate(np.zeros(0), derivative).shape == (0, 3)
 
 
 def test_an_arm_without_drives_has_trajectories() -> None:

@@ -66,7 +66,7 @@ class Smoothed:
         times = self.curve.times
         step = np.diff(times)
         t = times[:-1, None] + step[:, None] * _X
-        q = self.curve.evaluate(t.ravel()).reshape(*t.shape, -1) - self.start
+        q = self.curve.evaluate(t.ravel()).reshape(*t.shape, len(self.start)) - self.start
         pieces = (q * _W[:, None]).sum(axis=1) * step[:, None]
         return np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
 
@@ -77,7 +77,7 @@ class Smoothed:
         i = np.clip(np.searchsorted(curve.times, times, side="right") - 1, 0, len(curve.times) - 2)
         step = times - curve.times[i]
         nodes = curve.times[i][:, None] + step[:, None] * _X
-        q = curve.evaluate(nodes.ravel()).reshape(*nodes.shape, -1) - self.start
+        q = curve.evaluate(nodes.ravel()).reshape(*nodes.shape, len(self.start)) - self.start
         last_part = (q * _W[:, None]).sum(axis=1) * step[:, None]
         rest_part = np.maximum(t - curve.duration, 0.0)[:, None] * (self.end - self.start)
         return np.asarray(self._sums[i] + last_part + rest_part)
