@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -14,6 +15,7 @@ import armkin
 from armkin.board import path_run
 from armkin.board.backend import StoppedError
 from armkin.board.backend.sent_positions import Job
+from armkin.board.grbl import trajectory_to_gcode
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import expected_settings
@@ -263,6 +265,31 @@ def test_what_the_gripper_holds_is_gripped_again_after_a_stop() -> None:
     with pytest.raises(LinkError, match="a limit switch closed"):
         again.hold()
     assert connect_grbl(port).position() == "lost"
+
+
+def _seconds_of_lines(lines: list[str]) -> float:
+    """What lines from home last where each goes at its feed, and dwells [s]."""
+    place, seconds = {"X": 0.0, "Y": 0.0, "Z": 0.0}, 0.0
+    for line in lines:
+        words = {letter: float(number) for letter, number in re.findall(r"([XYZFP])([-0-9.]+)", line)}
+        travel = np.linalg.norm([words.get(letter, value) - value for letter, value in place.items()])
+        place |= {letter: words[letter] for letter in place if letter in words}
+        seconds += words.get("P", 0.0) + (60 * float(travel) / words["F"] if "F" in words else 0.0)
+    return seconds
+
+
+@pytest.mark.parametrize("tool_speed", [0.2, 1.0, 20.0])
+def test_a_slow_curve_takes_its_time(tool_speed: float) -> None:
+    """Where a step takes longer than a line, lines without one went at once: 1 mm/s was held as faster than planned."""
+    port = grbl_board()
+    machine = connect_grbl(port)
+    machine.prepare(assume=machine.arm.home)
+    plan = armkin.path(ARM, {"start": "home", "moves": [{"line": [258, 15, 367]}]}, tool_speed=tool_speed)
+    job = trajectory_to_gcode.job(plan.motion, np.array(machine.counts()))
+    lines = list(trajectory_to_gcode.gcode_lines(job, machine.axes, np.zeros(3, dtype=np.int64)))
+    assert _seconds_of_lines(lines) == pytest.approx(plan.duration, abs=trajectory_to_gcode.PIECE_TIME)
+    machine.run([job])
+    assert pin_counts(port) == armkin.pulses(ARM, plan.motion.end).tolist()
 
 
 def test_a_pause_of_a_path_is_a_dwell() -> None:

@@ -32,20 +32,20 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
     arm, position = job.trajectory.arm, np.asarray(job.start, dtype=np.int64)
     steps = np.array([axis.steps for axis in axes])
     for stretch in job.trajectory.stretches:
-        last_time = idle = 0.0
+        last_time = 0.0  # end of the last piece with a step; pieces without one add their time to the next that has one
         for t in _piece_times(stretch):
             goal = np.asarray(pulses(arm, stretch.evaluate(np.array([t]))[0]), dtype=np.int64)
             travel = float(np.linalg.norm((goal - position) / steps))
-            if travel > 0.0:
-                speed = travel * stretch.law.peak if isinstance(stretch, Straight) else travel / (t - last_time)
-                values = (goal + offset) / steps
-                words = "".join(f"{axes[k].letter}{values[k]:.5f}" for k in np.flatnonzero(goal != position).tolist())
-                yield f"{LINE_HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
-            else:
-                idle += t - last_time
+            if travel == 0.0:
+                continue
+            speed = travel * stretch.law.peak if isinstance(stretch, Straight) else travel / (t - last_time)
+            values = (goal + offset) / steps
+            words = "".join(f"{axes[k].letter}{values[k]:.5f}" for k in np.flatnonzero(goal != position).tolist())
+            yield f"{LINE_HEAD}G53G1{words}F{max(60 * speed, MIN_FEED):.3f}"
             position, last_time = goal, t
-        if idle > 0.0 and idle == stretch.duration:  # a pause; single pieces without a step are too short to matter
-            yield f"G4P{idle:.3f}"
+        rest = stretch.duration - last_time
+        if rest > PIECE_TIME or 0.0 < rest == stretch.duration:  # a slow end, or a pause; one piece is too short for it
+            yield f"G4P{rest:.3f}"
 
 
 def _piece_times(stretch: Stretch) -> Array:
