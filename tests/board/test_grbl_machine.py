@@ -6,6 +6,7 @@ import os
 import random
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,13 @@ import pytest
 
 import armkin
 from armkin.board import path_run
-from armkin.board.backend import StoppedError
+from armkin.board.backend import Planned, StoppedError
 from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl import trajectory_to_gcode
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.settings import expected_settings
+from armkin.board.kinds import board_of
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError, UsageError
 from armkin.model.build_arm import arm_of_file
@@ -276,6 +278,32 @@ def _seconds_of_lines(lines: list[str]) -> float:
         place |= {letter: words[letter] for letter in place if letter in words}
         seconds += words.get("P", 0.0) + (60 * float(travel) / words["F"] if "F" in words else 0.0)
     return seconds
+
+
+@pytest.mark.parametrize("jerk", [1, 100, 2000])  # [deg/s3]
+def test_a_joint_move_with_max_jerk_takes_its_time(jerk: float) -> None:
+    """GRBL knows no jerk: as one line it was ahead of the plan, and held."""
+    port, arm = grbl_board(), replace(ARM, max_jerk=np.deg2rad([jerk] * 3))
+    machine = GrblMachine(port, arm, lambda: False)
+    machine.prepare(assume=arm.home)
+    job = machine.plan(machine.counts(), np.deg2rad([[0, 80, -90], [20, 70, -60]]))
+    assert isinstance(job, Job)
+    lines = list(trajectory_to_gcode.gcode_lines(job, machine.axes, np.zeros(3, dtype=np.int64)))
+    assert _seconds_of_lines(lines) == pytest.approx(job.duration, abs=2 * trajectory_to_gcode.PIECE_TIME)
+    assert len(lines) <= job.segments
+    machine.run([job])
+    assert pin_counts(port) == list(machine.counts()) == job.end.tolist()
+
+
+def test_a_jog_keeps_max_jerk(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = replace(armkin.load(ROOT / "tests/robots/three_dof_grbl.yaml"), max_jerk=np.deg2rad([100.0] * 3))
+    board = board_of(arm)
+    machine, plans = board.connect(board.simulated()), list[Planned]()
+    monkeypatch.setattr(machine, "run", plans.extend)
+    board.jog(0, board.ready_to_jog(0, np.deg2rad(50.0)), 0.3)
+    [stretch] = [stretch for plan in plans for stretch in plan.trajectory.stretches]
+    assert stretch.end[0] - stretch.start[0] == pytest.approx(np.deg2rad(15.0), abs=np.deg2rad(0.03))  # a step
+    assert stretch.duration >= (32 * 15 / 100) ** (1 / 3)
 
 
 @pytest.mark.parametrize("tool_speed", [0.2, 1.0, 20.0])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ from armkin.motion.timing.trajectory import Trajectory
 from armkin.motors import exact_pulses, joints
 from command_line import ROOT, THREE_DOF, run
 
+_ROUNDED = 1e-6  # share of a rate, or [rad/s], that rounding leaves
 ROWS = "10,80,-80\n12,60,-82\n-3,70,-60\n-20,70,-85\n0,90,-90\n"
 PATH = """
 moves:
@@ -256,6 +258,23 @@ def test_a_way_of_less_than_a_step_is_taken() -> None:
             Trajectory(arm, standing, (straight_move(arm, standing, goal),)), [128, -1193, 1333], min_interval=448
         )
         assert _counts_reached(way) == way.end.tolist() != way.start.tolist()
+
+
+@pytest.mark.parametrize("begin", [0.0, 0.2, 0.5, 0.8, 0.999])
+def test_what_is_left_of_a_joint_move_keeps_max_jerk(begin: float) -> None:
+    from armkin.motion.remaining_stretch import remainder
+
+    arm, jerk = armkin.load(ROOT / THREE_DOF), np.deg2rad([100.0, 200.0, 100.0])
+    for held_arm, asked in ((replace(arm, max_jerk=jerk), None), (arm, jerk)):  # the file's, or asked for
+        whole = straight_move(held_arm, arm.home, np.deg2rad([60, 20, -20]), 0.5, jerk=asked)
+        t0 = begin * whole.duration
+        left = remainder(held_arm, whole, t0, whole.evaluate(np.array([t0]))[0])
+        t = np.linspace(0, left.duration, 4001)
+        assert np.abs(np.diff(left.evaluate(t, 2), axis=0) / t[1] / jerk).max() <= 1 + _ROUNDED
+        assert (left.top_speed <= (1 + _ROUNDED) * whole.top_speed).all()  # no faster than was asked for
+        assert np.abs(left.evaluate(t, 1)[[0, -1]]).max() < _ROUNDED  # from rest to rest
+        assert left.end == pytest.approx(whole.end)
+        assert left.duration <= (1 + _ROUNDED) * whole.duration
 
 
 @pytest.mark.parametrize("begin", [0.3, 0.5, 0.8, 0.95])

@@ -9,6 +9,8 @@ import pytest
 
 from command_line import COUNTS, POSE, ROOT, THREE_DOF, run
 
+_STEPS = 0.003  # share of a time that is less or more, since goals of 10 degrees are whole steps
+
 
 def test_a_dry_run_moves_nothing_and_needs_no_port() -> None:
     completed = run("send", THREE_DOF, *POSE, "--dry-run", "--json")
@@ -26,6 +28,38 @@ def test_half_the_speed() -> None:
     slow = run("send", THREE_DOF, *POSE, "--dry-run", "--speed", "50", "--json").json
     assert slow["top_speed"] == pytest.approx([10.59, 30, 30], abs=0.01)
     assert slow["duration_s"] > 3
+
+
+def _with_max_jerk(tmp_path: Path, jerk: float) -> Path:
+    """A copy of three_dof whose joints have a max_jerk [deg/s3]."""
+    path = tmp_path / "jerk.yaml"
+    text = (ROOT / THREE_DOF).read_text("utf-8")
+    path.write_text(text.replace("    max_accel: 120\n", f"    max_accel: 120\n    max_jerk: {jerk:g}\n"), "utf-8")
+    return path
+
+
+def test_a_move_keeps_the_max_jerk_of_the_file(tmp_path: Path) -> None:
+    path, least = _with_max_jerk(tmp_path, 100), (32 * 10 / 100) ** (1 / 3)
+    planned = run("send", path, 0, 80, -90, "--dry-run", "--json").json
+    assert planned["duration_s"] == pytest.approx(least, rel=_STEPS)
+    sent = run("send", path, 0, 80, -90, "--port", "sim", "--assume-home", "--json").json
+    assert (sent["duration_s"], sent["pulses"]) == (planned["duration_s"], planned["pulses"])
+    without = run("send", THREE_DOF, 0, 80, -90, "--dry-run", "--json").json
+    assert without["duration_s"] == pytest.approx(2 * (10 / 120) ** 0.5, rel=_STEPS)
+
+
+@pytest.mark.parametrize("blend", [[], ["--blend", 5]])
+def test_rows_keep_the_max_jerk_of_the_file(tmp_path: Path, blend: list[object]) -> None:
+    rows = tmp_path / "rows.csv"
+    rows.write_text("0,80,-90\n0,70,-90\n10,70,-90\n")
+    words = ("--batch", rows, *blend, "--port", "sim", "--assume-home", "--json")
+    jerky, gentle = (run("send", robot, *words).json for robot in (THREE_DOF, _with_max_jerk(tmp_path, 100)))
+    assert gentle["pulses"] == jerky["pulses"]
+    assert gentle["waypoints"] == jerky["waypoints"] == 3
+    least = (32 * 10 / 100) ** (1 / 3)  # of 10 degrees, the last move
+    assert gentle["duration_s"] > least > jerky["duration_s"] / 3
+    if not blend:
+        assert gentle["duration_s"] == pytest.approx(3 * least, rel=_STEPS)
 
 
 def test_a_trace_is_the_path_as_csv(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,6 +14,9 @@ from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan_joint_moves
 from armkin.motion.rounded_waypoints import round_waypoints
+
+_BETWEEN_POINTS = 0.002  # share of a rate that is more between two grid points
+_ROUNDED = 1e-9  # [rad] of a joint value
 
 
 @pytest.fixture(scope="module")
@@ -46,6 +50,23 @@ def test_corners_are_rounded_within_their_blend_and_all_limits(three_dof: Arm, h
     assert trajectory.q(trajectory.duration) == pytest.approx(rows[-1])
     stopping = plan_joint_moves(three_dof, rows[0], rows[1:]).duration
     assert stopping / trajectory.duration > 1.4
+
+
+@pytest.mark.parametrize(("jerk", "blend"), [(10, 10), (100, 1.5), (100, 10), (2000, 0.5)])  # [deg/s3], [deg]
+def test_corners_keep_the_jerk_too_within_their_blend(three_dof: Arm, jerk: float, blend: float) -> None:
+    arm = replace(three_dof, max_jerk=np.deg2rad([jerk, jerk, 2.0 * jerk]))
+    rows = random_waypoints(arm, 40, 15.0)
+    trajectory = round_waypoints(arm, rows[0], rows[1:], blend, hold=1.5)
+    t = np.linspace(0, trajectory.duration, 40_001)
+    q = trajectory.q(t)
+    changes = np.diff(trajectory.qd(t), n=2, axis=0) / t[1] ** 2
+    assert np.abs(changes / arm.max_jerk).max() == pytest.approx(1.0, abs=0.01)
+    assert np.abs(trajectory.qd(t) / arm.max_speed).max() <= 1 + _BETWEEN_POINTS
+    assert np.abs(trajectory.qdd(t) / arm.max_accel).max() <= 1 + _BETWEEN_POINTS
+    assert np.all((q >= arm.lower - _ROUNDED) & (q <= arm.upper + _ROUNDED))
+    assert max(np.rad2deg(np.linalg.norm(q - row, axis=1).min()) for row in rows) <= blend
+    assert q[[0, -1]] == pytest.approx(rows[[0, -1]])
+    assert trajectory.duration < plan_joint_moves(arm, rows[0], rows[1:]).duration
 
 
 def test_there_and_back_again_turns_round_within_the_limits(three_dof: Arm) -> None:

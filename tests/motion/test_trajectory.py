@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,12 +11,14 @@ from hypothesis import strategies as st
 
 from armkin.model import build_arm as arms
 from armkin.model.arm import Arm, from_links
-from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.joint_moves import approach_move, plan_joint_moves
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.profile import trapezoid
 from armkin.motion.timing.trajectory import Straight
+
+_DIFFERENCED = 1e-6  # of a jerk: what differences of accelerations leave of it
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +59,23 @@ def test_position_speed_and_acceleration_belong_together(three_dof: Arm) -> None
     assert trajectory.q(trajectory.begins) == pytest.approx(np.vstack([three_dof.home, goals]))
     assert trajectory.q([[-1.0, trajectory.duration + 1]]) == pytest.approx(np.array([[three_dof.home, goals[-1]]]))
     assert trajectory.q(0.5).shape == (3,)
+
+
+def test_joint_moves_keep_the_max_jerk_of_the_robot_file(three_dof: Arm) -> None:
+    jerk = np.deg2rad([100.0, 100.0, 400.0])
+    arm = replace(three_dof, max_jerk=jerk)
+    goals = np.deg2rad(np.array([[0, 80, -90], [60, 20, -20], [60, 20.5, -20], [0, 90, 90]]))
+    trajectory = plan_joint_moves(arm, arm.home, goals)
+    assert trajectory.begins[1] == pytest.approx((32 * 10 / 100) ** (1 / 3))  # no law with this jerk is faster
+    t = np.linspace(0, trajectory.duration, 40_001)
+    changes = np.diff(trajectory.qdd(t), axis=0) / t[1]
+    assert np.abs(changes / jerk).max() == pytest.approx(1.0, abs=_DIFFERENCED)
+    without = plan_joint_moves(three_dof, arm.home, goals)
+    assert without.begins[1] == pytest.approx(2 * np.sqrt(10 / 120))
+    assert all(stretch.law.is_trapezoid for stretch in without.stretches if isinstance(stretch, Straight))
+    way_back = approach_move(arm, goals[0], arm.home)
+    assert way_back is not None
+    assert way_back.duration == pytest.approx(trajectory.begins[1])
 
 
 def test_no_times_have_no_rows(three_dof: Arm) -> None:

@@ -17,6 +17,7 @@ from armkin.model import units
 from armkin.motion.path_planner.path_request import HOLD_FACTOR
 from armkin.motion.rounded_waypoints import round_waypoints
 from armkin.motion.timing.curved_stretch import Curve
+from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motors import joints, motor_names, pulse_units, pulses
 
 if TYPE_CHECKING:
@@ -75,7 +76,7 @@ class Total:
         self.first = self.first or plan.start.tolist()
         self.last = plan.end.tolist()
         self.waypoints += sum(
-            stretch.waypoints if isinstance(stretch, Curve) else 1 for stretch in plan.trajectory.stretches
+            stretch.waypoints if isinstance(stretch, Curve | Smoothed) else 1 for stretch in plan.trajectory.stretches
         )
         self.segments += plan.segments
         self.duration += plan.duration

@@ -24,7 +24,7 @@ MIN_SHARE = 1e-4  # least share of a joint's max_speed or max_accel
 
 
 def plan_joint_moves(arm: Arm, start: ArrayLike, targets: ArrayLike, *, speed: float = 1.0) -> Trajectory:
-    """Moves from joint values through joint targets, stopping at each, all joints together.
+    """Moves from joint values through joint targets, stopping at each, all joints together, within their rates.
 
     start: (n,); targets: (n,) or (w, n) [rad | mm]; speed: fraction of each joint's max_speed.
     Raises NoSolutionError for a target outside the limits, UsageError if max_speed or max_accel is missing.
@@ -59,7 +59,7 @@ def straight_move(
 ) -> Straight:
     """The fastest straight line in joint space from rest to rest: (n,), (n,) [rad | mm].
 
-    speed, share: fractions of max_speed and max_accel; jerk: (n,) [rad/s3 | mm/s3].
+    speed, share: fractions of max_speed and max_accel; jerk: (n,) [rad/s3 | mm/s3], by default as `check_jerk` says.
 
     A motor that drives several joints keeps to `motor_accel`, since a board brakes motors and not joints on a hold, and
     the joints' max_accel must hold then, too. On a short move its rounded whole steps count as well.
@@ -76,9 +76,10 @@ def straight_move(
     if motor_travel.any():
         accel = min(accel, float((motor_accel(arm)[motor_travel > 0] / motor_travel[motor_travel > 0]).min()))
     accel *= share
-    if jerk is None:
+    limit = check_jerk(arm, jerk)
+    if limit is None:
         return Straight(start, end, trapezoid(1.0, top_speed, accel))
-    return Straight(start, end, seven_phases(1.0, top_speed, accel, float((jerk[moves] / change[moves]).min())))
+    return Straight(start, end, seven_phases(1.0, top_speed, accel, float((limit[moves] / change[moves]).min())))
 
 
 def approach_move(

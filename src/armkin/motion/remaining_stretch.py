@@ -10,7 +10,7 @@ from armkin.formula.arrays import Array
 from armkin.motion.joint_moves import straight_move
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.profile import rest_profile, trapezoid
+from armkin.motion.timing.profile import rest_profile, seven_phases, trapezoid
 from armkin.motion.timing.trajectory import Straight
 from armkin.motors import motor_accel, pulses
 
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from armkin.motion.timing.trajectory import Stretch
 
 _TIME_STEP = 0.002  # step [s] of the plan's time between two grid points
+_MIN_SHARE = 1e-9  # least share of a straight line that is left, so that its rates stay finite
 _SHORT_TIME = 0.05  # a remainder below this time [s] is slow and nearly straight
 
 
@@ -34,17 +35,26 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, present: Array) -> Stret
         if np.array_equal(pulses(arm, present), pulses(arm, stretch.end)):
             return Straight(stretch.end, stretch.end, rest_profile(max(time_left, 0.0)))  # a pause
         return straight_move(arm, present, stretch.end)
-    if isinstance(stretch, Straight) and stretch.law.is_trapezoid:
-        share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), 1e-9)
-        # Rounding to whole steps changes the joints' shares on a short path, so each keeps its own limits, too.
-        fastest = straight_move(arm, present, stretch.end).law
-        peak, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
-        return Straight(present, stretch.end, trapezoid(1.0, peak, accel) if fastest.length else fastest)
+    if isinstance(stretch, Straight):
+        return _rest_of_line(arm, stretch, begin, present)
     if time_left < _SHORT_TIME:
         return straight_move(arm, present, stretch.end)
     s = _grid_times(stretch, begin)
     path = Knots(s, stretch.evaluate(s), stretch.evaluate(s, 1))
     return Curve(path, _run_up(arm, path))
+
+
+def _rest_of_line(arm: Arm, stretch: Straight, begin: float, present: Array) -> Straight:
+    """The remainder of a straight line, within the plan's own speed, acceleration and jerk."""
+    share = max(1.0 - float(stretch.law.evaluate(np.array([begin]))[0]), _MIN_SHARE)
+    # Rounding to whole steps changes the joints' shares on a short path, so each keeps its own limits, too.
+    fastest = straight_move(arm, present, stretch.end).law
+    if not fastest.length:
+        return Straight(present, stretch.end, fastest)
+    peak, accel = min(stretch.law.peak / share, fastest.peak), min(stretch.law.accel / share, fastest.accel)
+    jerks = [float(jerk.max()) for jerk in (stretch.law.jerk / share, fastest.jerk) if jerk.any()]
+    law = seven_phases(1.0, peak, accel, min(jerks)) if jerks else trapezoid(1.0, peak, accel)
+    return Straight(present, stretch.end, law)
 
 
 def _grid_times(stretch: Stretch, begin: float) -> Array:

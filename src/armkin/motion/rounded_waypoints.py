@@ -12,10 +12,11 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.branches.branch_path import coupled_motors
-from armkin.motion.joint_moves import check_rates
+from armkin.motion.joint_moves import check_jerk, check_rates
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
+from armkin.motion.timing.limit_jerk import Smoothed, share_within, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, optimal_law
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -39,7 +40,9 @@ def round_waypoints(
 
     start: (n,); targets: (w, n) [rad | mm]; blend: how far from a corner its rounding begins, as the length of the
     change of joint values in degrees and mm, at most half of the way to the next corner. The rounding stays between
-    the corner and its chord: within all limits that the corners keep. Other arguments as in `armkin.path`.
+    the corner and its chord: within all limits that the corners keep. The jerk of an arm with max_jerk is kept by a
+    moving average, for which the corner is left earlier; it is passed within `blend`. Other arguments as in
+    `armkin.path`.
 
     >>> import armkin, numpy as np
     >>> arm = armkin.load("three_dof")
@@ -62,9 +65,14 @@ def round_waypoints(
     cap = np.full(len(path.s), np.inf)
     if hold is not None and len(arm.motor_gain) and arm.motor_gain.any(axis=0).all():
         cap = hold_cap(arm, path, hold)
+    window, jerk = 0.0, check_jerk(arm, None)
+    if jerk is not None:
+        # a parabola is at most half a blend from its corner, so the average may be the other half from the parabola
+        accel *= share_within(blend / 2, arm.max_accel * accel / unit, jerk / unit)
+        window = smoothing_window(arm.max_accel * accel, jerk)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
-    x = optimal_law(path, bounds, coupled_motors(arm, accel))
-    return Trajectory(arm, first, (Curve(path, x, len(goals)),))
+    curve = Curve(path, optimal_law(path, bounds, coupled_motors(arm, accel)), len(goals))
+    return Trajectory(arm, first, (Smoothed(curve, window) if window else curve,))
 
 
 def _rounded_way(corners: Array, blend: float) -> Knots:

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.sent_positions import piece_times
 from armkin.board.ports import read_note, record_path, remove_note, write_note
-from armkin.motion.timing.trajectory import Straight
 from armkin.motors import pulses
 
 if TYPE_CHECKING:
@@ -102,11 +102,10 @@ class Record:
 
 
 def path_corners(job: Job, piece: float) -> NDArray[np.int64]:
-    """Corners (points, motors) [counts] of a job whose curves are sent in pieces of `piece` seconds."""
+    """Corners (points, motors) [counts] of a job that is sent in pieces of `piece` seconds, see `piece_times`."""
     arm, points = job.trajectory.arm, [np.asarray(job.start, dtype=np.int64)[None]]
     for stretch in job.trajectory.stretches:
-        count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / piece)), 1)
-        points.append(pulses(arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:])))
+        points.append(pulses(arm, stretch.evaluate(piece_times(stretch, piece))))
     return np.concatenate(points)
 
 

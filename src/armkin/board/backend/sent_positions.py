@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armkin.board.backend.motion_start import StartedTrajectory
 from armkin.motion.joint_moves import plan_joint_moves
-from armkin.motion.timing.trajectory import brake_share
+from armkin.motion.timing.trajectory import Straight, brake_share
 from armkin.motors import joints, pulses
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.timing.trajectory import Trajectory
+    from armkin.motion.timing.trajectory import Stretch, Trajectory
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,20 @@ class Job(StartedTrajectory):
     def top_rate(self) -> Array:
         """Greatest rate of every motor: (motors,) [counts/s]."""
         return np.asarray(np.abs(self.trajectory.arm.motor_gain) @ self.trajectory.top_speed)
+
+
+def is_one_line(stretch: Stretch) -> TypeGuard[Straight]:
+    """Whether a board that speeds up and slows down by itself makes a stretch of its end: a straight line without jerk.
+
+    With jerk it is sent in pieces, as curves are: such a board would be ahead of its plan.
+    """
+    return isinstance(stretch, Straight) and not stretch.law.jerk.any()
+
+
+def piece_times(stretch: Stretch, piece: float) -> Array:
+    """Ends of the pieces [s], of `piece` seconds at most, in which a stretch is sent to such a board."""
+    count = 1 if is_one_line(stretch) else max(int(np.ceil(stretch.duration / piece)), 1)
+    return np.asarray(np.linspace(0.0, stretch.duration, count + 1)[1:])
 
 
 def plan_targets(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.sent_positions import is_one_line
 from armkin.board.grbl.trajectory_to_gcode import PIECE_TIME
 from armkin.errors import LinkError
-from armkin.motion.timing.trajectory import Straight
 from armkin.motors import exact_pulses, pulses
 
 if TYPE_CHECKING:
@@ -105,5 +105,5 @@ def _path_samples(job: Job) -> tuple[Array, Array]:
         t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE_TIME)), 1) + 1)[1:]
         q = stretch.evaluate(t)
         times.append(start_time + t)
-        points.append(exact_pulses(arm, q) if isinstance(stretch, Straight) else pulses(arm, q).astype(float))
+        points.append(exact_pulses(arm, q) if is_one_line(stretch) else pulses(arm, q).astype(float))
     return np.concatenate(times), np.concatenate(points)

@@ -107,8 +107,8 @@ def send(
 ) -> None:
     """Move the arm.
 
-    All joints start and stop together, within each joint's max_speed and max_accel. Ctrl-C stops the arm on
-    its path; its position stays known.
+    All joints start and stop together, within each joint's max_speed, max_accel and max_jerk. Ctrl-C stops the
+    arm on its path; its position stays known.
     """
     from armkin.board.planner import Planner
 

@@ -1,4 +1,4 @@
-"""Limits the jerk of a path: a moving average smooths its curve in time.
+"""Limits the jerk of a path, and of rounded waypoints: a moving average smooths their curve in time.
 
 Joint moves are limited in jerk by the seven phases of `profile.py` instead.
 """
@@ -24,6 +24,16 @@ def smoothing_window(accel: Array, jerk: ArrayLike) -> float:
     return float((2 * accel / np.asarray(jerk, dtype=float)).max())
 
 
+def share_within(distance: float, accel: Array, jerk: ArrayLike) -> float:
+    """The share of accelerations (n,) at which the moving average stays within a distance of its curve at any time.
+
+    distance, accel, jerk: in lengths that may be added up in squares. The average over T is off by at most T^2/24 times
+    the greatest length of the acceleration, and T itself is in proportion to that.
+    """
+    farthest = smoothing_window(accel, jerk) ** 2 / 24 * float(np.linalg.norm(accel))
+    return float(min(1.0, (distance / farthest) ** (1 / 3)))
+
+
 @dataclass(frozen=True)
 class Smoothed:
     """The moving average of a curve over the last `window` seconds, whose jerk is bounded.
@@ -40,6 +50,11 @@ class Smoothed:
     def duration(self) -> float:
         """Seconds."""
         return self.curve.duration + self.window
+
+    @property
+    def waypoints(self) -> int:
+        """Waypoints that it leads through, its end included."""
+        return self.curve.waypoints
 
     @property
     def start(self) -> Array:
