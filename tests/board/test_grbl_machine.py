@@ -333,3 +333,43 @@ def test_a_pause_of_a_path_is_a_dwell() -> None:
         machine.run([part])
     assert port.now() - before > 1.5
     assert pin_counts(port) == [0, 0, 0]
+
+
+def test_rows_in_one_direction_rest_at_each_as_planned() -> None:
+    """GRBL goes over from line to line without a stop: it would be half a second ahead of its plan at each row."""
+    port = grbl_board()
+    machine = connect_grbl(port)
+    assert machine.prepare(assume=machine.arm.home)
+    goals = np.deg2rad([[angle, 90.0, -90.0] for angle in (20.0, 40.0, 60.0, 80.0, 60.0, 10.0)])
+    job = machine.plan(machine.counts(), goals)
+    began = port.now()
+    machine.run([job])
+    assert list(machine.counts()) == pin_counts(port) == job.end.tolist()
+    assert 0.0 <= port.now() - began - job.duration < 0.5
+    times = np.array([time for time, _ in port.history])
+    counts = np.array([steps[0] for _, steps in port.history])
+    speed = np.abs(np.diff(counts)) / np.diff(times)
+    for goal in armkin.pulses(ARM, goals)[:-1, 0]:
+        at = np.flatnonzero(np.abs(counts - goal) <= 5)
+        assert speed[at[0] : at[-1]].min() < 0.1 * speed.max()
+
+
+def test_the_simulated_grbl_passes_a_straight_joint_of_two_lines_at_full_speed() -> None:
+    """20 and 40 units at 10 units/s and 10 units/s2, by $11 also round a corner of 90 degrees."""
+    settings = {}
+    for axis in range(3):
+        settings |= {100 + axis: 250, 110 + axis: 600, 120 + axis: 10}
+    durations = []
+    for lines in ("X20 X40", "X20 P0 X40", "X20 Y20", "X20 X0"):
+        port, answers = Grbl(3, "sim", settings), b""
+        began, words = port.now(), [*lines.split(), "P0"]
+        port.write("".join(f"{'G4' if word == 'P0' else 'G1F600'}{word}\n" for word in words).encode())
+        while answers.count(b"ok") < len(words):
+            answers += port.read(0.01)
+        durations.append(port.now() - began)
+    straight, stopped, corner, back = durations
+    assert straight == pytest.approx(5.0, abs=0.1)  # 4 s at full speed, and 1 s more to speed up and slow down
+    assert stopped == pytest.approx(6.0, abs=0.1)
+    corner_speed = (10 * 2**0.5 * 0.01 * 0.5**0.5 / (1 - 0.5**0.5)) ** 0.5
+    assert stopped - corner == pytest.approx(2 * corner_speed / 10, abs=0.02)
+    assert back == pytest.approx(6.0, abs=0.1)

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 PIECE_TIME = 0.04  # length [s] of a stretch in one line, if it is curved or has jerk: 25 lines a second
 LINE_HEAD = "G21G94"  # words in every line, as another program may set inches or inverse time
+STOP = "G4P0"  # a dwell is carried out after all lines before it, at rest
 MIN_FEED = 0.01  # lowest feed [units/min], as GRBL refuses 0
 
 
@@ -44,3 +45,5 @@ def gcode_lines(job: Job, axes: Sequence[Axis], offset: NDArray[np.int64]) -> It
         rest = stretch.duration - last_time
         if rest > PIECE_TIME or 0.0 < rest == stretch.duration:  # a slow end, or a pause; one piece is too short for it
             yield f"G4P{rest:.3f}"
+        elif is_one_line(stretch) and last_time and stretch is not job.trajectory.stretches[-1]:
+            yield STOP  # the plan rests here, and GRBL would pass the corner without

@@ -8,7 +8,7 @@ sim_motors.py           moves its motors: segment_queue.py, sim_homing.py, sim_j
 axis_counts.py          its counts; digital_inputs.py: its switches
 
 clock.py          the time of the others
-sim_grbl.py       GRBL; grbl_modes.py: what its lines mean
+sim_grbl.py       GRBL; grbl_modes.py: what its lines mean; grbl_blocks.py: how they are carried out
 sim_klipper.py    Klipper
 sim_servo_bus.py  bus servos
 """

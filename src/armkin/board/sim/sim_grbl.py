@@ -3,7 +3,7 @@
 It keeps what armkin relies on, and what other programs may do to it: the receive buffer, a line that is put together
 byte by byte, answers in order, planner blocks, status reports with three decimals, feed hold along the path, in which
 no line is taken, soft reset, alarms with their locks, settings, modes and offsets (grbl_modes.py), overrides and
-homing. Its blocks start and end at rest; GRBL itself looks ahead. `hal`: as grblHAL, which takes whole numbers alone
+homing. It does not stop between two lines (grbl_blocks.py). `hal`: as grblHAL, which takes whole numbers alone
 for whole-number settings, keeps G92 over a soft reset, and over a loss of power unless $384 is 1.
 """
 
@@ -16,6 +16,7 @@ from functools import partial
 
 from armkin.board.grbl.replies import RX_BUFFER
 from armkin.board.sim.clock import SimulatedTime
+from armkin.board.sim.grbl_blocks import JUNCTION_DEVIATION, Block, advance_first, block_to
 from armkin.board.sim.grbl_modes import Modes, Words
 
 MAX_BLOCKS = 15  # blocks of the planner
@@ -24,32 +25,22 @@ _OFFSET_REPORT_PERIOD = 10  # reports between two that tell offset and overrides
 _FEED_OVERRIDES = {0x90: 100, 0x91: 10, 0x92: -10, 0x93: 1, 0x94: -1}  # overrides [%] by byte; 0x90 takes them back
 _INTEGER_SETTINGS = {1, 3, 10, 13, 20, 21, 22, 23, 32, 384}  # settings of whole numbers
 
-
-@dataclass
-class Block:
-    """A straight line in steps."""
-
-    start: tuple[int, ...]
-    end: tuple[int, ...]
-    length: float  # [units]
-    feed: float  # [units/s] as asked for
-    max_speed: float  # [units/s] that the axes allow
-    accel: float  # [units/s2]
-    jog: bool = False
-    distance_done: float = 0.0  # [units]
-    rate: float = 0.0  # [units/s]
-    line: bool = True  # False: a dwell, `distance_done` counts seconds up to `length`
-
-    def advance(self, seconds: float, override: int, is_holding: bool) -> float:
-        """Go on for some seconds; the share of the way that is done."""
-        left, change = self.length - self.distance_done, self.accel * seconds
-        speed = min(self.feed * override / 100, self.max_speed)
-        if is_holding or self.rate**2 / (2 * self.accel) >= left or self.rate > speed + change:
-            self.rate = max(0.0 if is_holding else change, self.rate - change)
-        else:
-            self.rate = min(speed, self.rate + change)
-        self.distance_done = min(self.length, self.distance_done + self.rate * seconds)
-        return self.distance_done / self.length if self.length else 1.0
+_DEFAULTS = {
+    1: 25,
+    3: 0,
+    10: 1,
+    JUNCTION_DEVIATION: 0.01,
+    13: 0,
+    20: 0,
+    21: 0,
+    22: 0,
+    23: 0,
+    25: 20,
+    27: 1,
+    30: 1000,
+    31: 0,
+    32: 0,
+}
 
 
 @dataclass
@@ -87,7 +78,7 @@ class Grbl(SimulatedTime):
 
     def __post_init__(self) -> None:
         super().__init__()
-        defaults = {1: 25, 3: 0, 10: 1, 13: 0, 20: 0, 21: 0, 22: 0, 23: 0, 25: 20, 27: 1, 30: 1000, 31: 0, 32: 0}
+        defaults = dict(_DEFAULTS)
         for k in range(self.axes):
             defaults |= {100 + k: 250, 110 + k: 500, 120 + k: 10, 130 + k: 200}
         self.settings = {**defaults, **({384: 0} if self.hal else {}), **self.settings}
@@ -182,7 +173,7 @@ class Grbl(SimulatedTime):
                 self._blocks.popleft()
                 self._send("ok")
             return
-        share = block.advance(seconds, self.override, self._holding)
+        share = advance_first(self._blocks, self.settings, seconds, self.override, self._holding)
         steps = [round(a + share * (b - a)) for a, b in zip(block.start, block.end, strict=True)]
         if steps != self.steps:
             self.steps = steps
@@ -322,25 +313,9 @@ class Grbl(SimulatedTime):
     def _plan_block(self, start: Sequence[int], goal: Sequence[float], jog: float | None = None) -> None:
         rapid = jog is None and self.modes.motion == 0.0
         feed = self.modes.feed if jog is None else jog
-        if block := _block_to(self.settings, start, goal, math.inf if rapid else feed / 60, jog is not None):
+        if block := block_to(self.settings, start, goal, math.inf if rapid else feed / 60, jog is not None):
             block.feed *= block.length if self.modes.inverse and not rapid else 1.0
             self._blocks.append(block)
-
-
-def _block_to(
-    settings: Mapping[int, float], start: Sequence[int], goal: Sequence[float], feed: float, jog: bool
-) -> Block | None:
-    """A block to a goal in units; None: nothing to do."""
-    steps_per_unit = [settings[100 + k] for k in range(len(start))]
-    end = [round(value * scale) for value, scale in zip(goal, steps_per_unit, strict=True)]
-    change = [(end_count - count) / scale for count, end_count, scale in zip(start, end, steps_per_unit, strict=True)]
-    length = math.hypot(*change)
-    if length == 0.0:
-        return None
-    shares = [abs(travel) / length for travel in change]
-    max_speed = min(settings[110 + k] / 60 / share for k, share in enumerate(shares) if share)
-    accel = min(settings[120 + k] / share for k, share in enumerate(shares) if share)
-    return Block(tuple(start), tuple(end), length, feed, max_speed, accel, jog)
 
 
 def _version_lines(hal: bool) -> list[str]:
