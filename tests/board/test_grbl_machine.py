@@ -356,7 +356,7 @@ def test_rows_in_one_direction_rest_at_each_as_planned() -> None:
 
 def test_the_simulated_grbl_passes_a_straight_joint_of_two_lines_at_full_speed() -> None:
     """20 and 40 units at 10 units/s and 10 units/s2, by $11 also round a corner of 90 degrees."""
-    settings = {}
+    settings: dict[int, float] = {}
     for axis in range(3):
         settings |= {100 + axis: 250, 110 + axis: 600, 120 + axis: 10}
     durations = []
