@@ -18,6 +18,7 @@ from armkin.keep_out.motion_geometry import Cubics
 from armkin.keep_out.motion_proof import hit_samples
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.plan.trajectory_proof import check_free, hit_time, prove_trajectory
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -111,9 +112,37 @@ def test_a_path_tells_a_lower_bound_of_its_clearance(table: Path) -> None:
     for jerk in (None, 8.0):
         plan = armkin.path(arm, [[390, 80, 300], [390, -80, 200], [300, -80, 250]], blend=5, jerk=jerk)
         assert plan.clearance is not None
-        sampled = float(np.min(armkin.clearance(arm, plan.q(np.linspace(0, plan.duration, 5000))).mm))
+        sampled = _least_sampled(plan)
         assert 0 <= plan.clearance["mm"] <= sampled <= plan.clearance["mm"] + 1.0
         assert plan.clearance["with"] == "table"
+
+
+def _least_sampled(plan: PathPlan) -> float:
+    return float(np.min(armkin.clearance(plan.arm, plan.q(np.linspace(0, plan.duration, 5000))).mm))
+
+
+@pytest.mark.parametrize("jerk", [None, 8.0])
+def test_a_path_that_hits_tells_a_lower_bound_as_well(jerk: float | None, table: Path) -> None:
+    """One that ignores what it hits, one that starts inside and leaves, and one that is refused."""
+    arm = armkin.load("three_dof", scene=table)
+    ignoring, inside = replace(arm, ignores_keep_out=True), np.deg2rad([0, 20, -45])
+    through: list[list[float]] = [[390, 80, 300], [390, -80, 60], [390, -80, 300]]
+    with pytest.raises(NoSolutionError) as raised:  # it comes near the table, hits it, and then goes deeper
+        armkin.path(arm, {"moves": [{"joint": [0, 60, -90]}, {"joint": [0, 10, -30]}, {"joint": [0, 0, -45]}]})
+    plans = [
+        armkin.path(ignoring, through, jerk=jerk),
+        armkin.path(arm, [[390, 80, 300], [390, -80, 250]], start=inside, jerk=jerk),
+        raised.value.plan,
+    ]
+    for plan in plans:
+        least = _least_sampled(plan)
+        assert least < -10.0
+        assert plan.clearance["mm"] <= least <= plan.clearance["mm"] + 0.1
+        assert plan.clearance["with"] == "table"
+    times = np.linspace(0, plans[0].duration, 5000)
+    there = plans[0].q(times[np.abs(plans[0].s(times) - plans[0].clearance["s_mm"]).argmin()])
+    assert armkin.clearance(arm, there).mm == pytest.approx(_least_sampled(plans[0]), abs=0.2)
+    assert plans[1].clearance["s_mm"] == 0.0
 
 
 def test_a_path_through_the_table_is_refused_with_the_place(table: Path) -> None:

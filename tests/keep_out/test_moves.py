@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -137,6 +138,15 @@ def test_path_tells_its_clearance(table: str) -> None:
     hit = run("path", "three_dof", "-", "--scene", table, "--json", stdin=b"moves:\n  - joint: [0, 10, -30]\n")
     assert hit.code == 3
     assert hit.json["clearance"]["with"] == "table"
+
+
+def test_a_path_through_the_table_tells_the_depth_that_it_is_warned_of(table: str) -> None:
+    words = ["path", "three_dof", "--via", "390,80,300", "--via", "390,-80,30", "--scene", table, "--ignore-keep-out"]
+    answer, text = run(*words, "--json"), run(*words)
+    [depth] = re.findall(r"this motion hits table by (\d+\.\d) mm \(q3\)", answer.err)
+    assert answer.json["clearance"]["mm"] == pytest.approx(-float(depth), abs=0.1)
+    [shown] = re.findall(r"hits table by up to (\d+\.\d) mm \(q3\)", text.out)
+    assert float(shown) == pytest.approx(float(depth), abs=0.1)
 
 
 def test_rows_that_stream_in_are_proved_one_by_one(table: str) -> None:

@@ -11,7 +11,6 @@ it must not overlap again.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,15 +31,17 @@ _MIN_SHARE = 1e-9  # share of a cell below which no interval is halved
 _STRIDES = (64, 8, 1)  # strides of the samples, from coarse to fine
 _GAP = 0.5  # allowed gap [mm] between bound and least sampled clearance
 _GAP_SHARE = 0.05  # the same as a share of the clearance; the larger of both counts
+_DEPTH_GAP = 0.05  # allowed gap [mm] where something is hit, up to _FINE_SAMPLES
+_FINE_SAMPLES = 4096  # number of samples
 
 
 @dataclass(frozen=True)
 class Proof:
     """The result of a proof.
 
-    free: whether nothing is hit, except by pairs that overlap at the start. place: of the first hit, or of the least
-    clearance; pair: its index, None without pairs; mm: a lower bound of the clearance of all other pairs over the whole
-    motion, or the clearance at the hit; escaping: pairs that overlap at the start; postures: number of samples.
+    free: whether nothing is hit that must not be. place: of the first hit, or of the least clearance; pair: its index,
+    None without pairs; mm: a lower bound of the clearance of all pairs over the whole motion; escaping: pairs that
+    overlap at the start; postures: number of samples.
     """
 
     free: bool
@@ -52,12 +53,17 @@ class Proof:
 
 
 def prove_motion(
-    guard: Guard, motion: JointMotion, *, tight: bool = False, ignored_pairs: tuple[int, ...] | None = None
+    guard: Guard,
+    motion: JointMotion,
+    *,
+    tight: bool = False,
+    may_hit: bool = False,
+    ignored_pairs: tuple[int, ...] | None = None,
 ) -> Proof:
     """Prove a motion free, or find its first hit.
 
-    tight: refine until the bound is close to the least sampled clearance. ignored_pairs: pairs that may overlap at the
-    start, by default all that do.
+    tight: refine until the bound is close to the least sampled clearance. may_hit: find no hit, the bound alone.
+    ignored_pairs: pairs that may overlap at the start, by default all that do.
     """
     if not guard.pairs:
         return Proof(free=True, place=0.0, pair=None, mm=np.inf, escaping=(), postures=0)
@@ -70,7 +76,8 @@ def prove_motion(
     if ignored_pairs is not None:
         overlaps_at_start = overlaps_at_start & np.isin(np.arange(len(overlaps_at_start)), ignored_pairs)
     while True:
-        refinement = _Round(places, clearances, motion.variation(places[:-1], places[1:]) @ rates, overlaps_at_start)
+        motions = motion.variation(places[:-1], places[1:]) @ rates
+        refinement = _Round(places, clearances, motions, overlaps_at_start, may_hit=may_hit)
         middle = refinement.to_halve(tight)
         if not len(middle):
             return refinement.result()
@@ -107,12 +114,14 @@ def hit_samples(guard: Guard, q: Array) -> NDArray[np.bool_]:
 class _Round:
     """One refinement of a proof: `clearances` (N, pairs) at places (N,), and the motions of the bodies in between."""
 
-    def __init__(self, places: Array, clearances: Array, motions: Array, overlaps_at_start: NDArray[np.bool_]) -> None:
+    def __init__(
+        self, places: Array, clearances: Array, motions: Array, overlaps_at_start: NDArray[np.bool_], *, may_hit: bool
+    ) -> None:
         self.places, self.clearances, self.start = places, clearances, overlaps_at_start
         self.bound = (clearances[:-1] + clearances[1:] - motions) / 2
         greatest = np.maximum.accumulate(clearances, axis=0)
         # least allowed clearance from there on
-        allowed = np.where(overlaps_at_start & (greatest < 0.0), greatest - STEP, 0.0)
+        allowed = np.where(overlaps_at_start & (greatest < 0.0), greatest - STEP, 0.0) - (np.inf if may_hit else 0.0)
         required_clearances = np.concatenate([allowed[:1], allowed[:-1]])
         is_hit = (clearances < required_clearances).any(axis=1)
         self.hit = int(np.argmax(is_hit)) if is_hit.any() else len(places)  # the first place of a hit
@@ -128,10 +137,11 @@ class _Round:
     def to_halve(self, tight: bool) -> Array:
         """Places at which undecided intervals are split; empty when the proof is complete."""
         rows = np.flatnonzero(self.open)
-        if tight and not len(rows) and self.hit == self.stuck == len(self.places):
-            bounds = np.where(self.start, np.inf, self.bound).min(axis=1, initial=np.inf)
-            lowest = float(np.where(self.start, np.inf, self.clearances).min(initial=np.inf))
-            rows = np.flatnonzero(bounds < lowest - max(_GAP, _GAP_SHARE * lowest)) if np.isfinite(lowest) else rows
+        if tight and not len(rows):
+            lowest = float(self.clearances.min())
+            is_fine = lowest < 0.0 and len(self.places) < _FINE_SAMPLES
+            gap = _DEPTH_GAP if is_fine else max(_GAP, _GAP_SHARE * abs(lowest))
+            rows = np.flatnonzero(self.bound.min(axis=1) < lowest - gap)
         rows = rows[:_AT_ONCE]
         low, high = self.places[rows], self.places[rows + 1]
         cell_end = np.round((low + high) / 2)  # an interval of several cells is split at the end of a cell
@@ -140,20 +150,13 @@ class _Round:
 
     def result(self) -> Proof:
         """The result after the last refinement."""
-        count = len(self.places)
-        proof = partial(Proof, escaping=tuple(np.flatnonzero(self.start).tolist()), postures=count)
+        row, pair = divmod(int(np.argmin(self.bound)), self.bound.shape[1])
+        index, mm = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair]), float(self.bound[row, pair])
+        count, is_free = len(self.places), self.stuck == self.hit == len(self.places)
         if self.stuck < count:
-            pair = int(np.argmin(self.lacking[self.stuck]))
-            least_clearance = float(self.clearances[self.stuck : self.stuck + 2, pair].min())
-            return proof(free=False, place=float(self.places[self.stuck]), pair=pair, mm=least_clearance)
-        if self.hit < count:
-            pair = int(np.argmin(self.clearances[self.hit]))
-            depth = float(self.clearances[self.hit, pair])
-            return proof(free=False, place=float(self.places[self.hit]), pair=pair, mm=depth)
-        bound = np.where(self.start, np.inf, self.bound)
-        if not len(bound) or not np.isfinite(bound).any():
-            pair = int(np.argmin(self.clearances[0]))
-            return proof(free=True, place=0.0, pair=pair, mm=float(self.clearances[:, pair].min()))
-        row, pair = divmod(int(np.argmin(bound)), bound.shape[1])
-        index = row + int(self.clearances[row + 1, pair] < self.clearances[row, pair])
-        return proof(free=True, place=float(self.places[index]), pair=pair, mm=float(bound[row, pair]))
+            index, pair = self.stuck, int(np.argmin(self.lacking[self.stuck]))
+        elif self.hit < count:
+            index, pair = self.hit, int(np.argmin(self.clearances[self.hit]))
+        escaping = tuple(np.flatnonzero(self.start).tolist())
+        place = float(self.places[index])
+        return Proof(free=is_free, place=place, pair=pair, mm=mm, escaping=escaping, postures=count)

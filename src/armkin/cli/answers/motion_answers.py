@@ -95,7 +95,7 @@ PathClearance = TypedDict(
             float | None,
             "lower bound of the distance over the whole motion [mm]; negative: a hit; null: no pair counts",
         ],
-        "s_mm": Annotated[float, "where it is least, or where the first hit is: distance along the path [mm]"],
+        "s_mm": Annotated[float, "where it is least; of a refused path where the first hit is: distance along it [mm]"],
         "body": Annotated[str, "body of the arm: the name of the joint that moves it, or base"],
         "with": Annotated[str, "name of the keep-out, or of another body of the arm"],
     },

@@ -48,10 +48,10 @@ def _head_lines(plan: PathPlan, answer: dict[str, Any]) -> list[str]:
 
 
 def _clearance_text(nearest: dict[str, Any]) -> str:
-    """Where the arm comes nearest to a keep-out."""
+    """Where the arm comes nearest to a keep-out, or hits one."""
     clearance = nearest["mm"]
     if clearance is not None and clearance < 0:
-        return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} inside {nearest['with']}, {-clearance:.1f} mm deep"
+        return f"  at {nearest['s_mm']:.3f} mm: hits {nearest['with']} by up to {-clearance:.1f} mm ({nearest['body']})"
     distance_text = "nothing counts" if clearance is None else f"at least {clearance:.1f} mm"
     return f"  at {nearest['s_mm']:.3f} mm: {nearest['body']} nearest to {nearest['with']}, {distance_text}"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
 from typing import TYPE_CHECKING
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 class TrajectoryProof:
     """The result of a proof: the first hit of a trajectory, or its place of least clearance.
 
-    mm: the clearance; stretch, cell: the place, as number of the stretch and position in its cells; joints: (n,)
-    [rad | mm] there; body, keep_out: names of the pair, empty if there is none; escaping: pairs that were too near
-    each other at the start; postures: how many were tested.
+    mm: a lower bound of the clearance over the whole motion; stretch, cell: the place, as number of the stretch and
+    position in its cells; joints: (n,) [rad | mm] there; body, keep_out: names of the pair, empty if there is none;
+    escaping: pairs that were too near each other at the start; postures: how many were tested.
     """
 
     free: bool
@@ -95,31 +95,36 @@ def _control_points(stretch: Stretch) -> Array:
 
 
 def prove_trajectory(trajectory: Trajectory, *, tight: bool = False) -> TrajectoryProof | None:
-    """Prove that a trajectory hits nothing; None for an arm without keep-outs. tight: see `prove_motion`."""
+    """Prove that a trajectory hits nothing; None for an arm without keep-outs.
+
+    tight: see `prove_motion`; the bound is then that of the whole motion where it hits something, too. For an arm that
+    ignores its keep-outs nothing is proved, and the bound alone is looked for.
+    """
     arm = trajectory.arm
     full_arm, _ = whole_arm(arm, trajectory.start[None])
     if not full_arm.keep_out:
         return None
     from armkin.keep_out.body_pairs import guard
 
-    bodies, postures = guard(full_arm), 0
-    allowed, nearest = None, None
+    bodies, parts = guard(full_arm), list[TrajectoryProof]()
+    allowed: tuple[int, ...] | None = None
     escaping: tuple[int, ...] = ()
+    postures = 0
     for first, geometry in _geometries(trajectory):
+        may_hit = arm.ignores_keep_out or not all(part.free for part in parts)
         full_geometry = _UnlockedMotion(arm, geometry)
-        proof = prove_motion(bodies, full_geometry, tight=tight, ignored_pairs=allowed)
+        proof = prove_motion(bodies, full_geometry, tight=tight, may_hit=may_hit, ignored_pairs=allowed)
         postures += proof.postures
-        if allowed is None:
-            escaping = proof.escaping
+        escaping = proof.escaping if allowed is None else escaping
         allowed = proof.escaping
-        part_proof = _proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, geometry)
-        if not proof.free:
-            return part_proof
-        if nearest is None or part_proof.mm < nearest.mm:
-            nearest = part_proof
-    if nearest is None:  # no stretch: the arm stays where it is
+        parts.append(_proof_on_trajectory(trajectory, bodies, first, proof, escaping, postures, geometry))
+        if not proof.free and not tight:
+            break
+    if not parts:  # no stretch: the arm stays where it is
         return None
-    return TrajectoryProof(**{**vars(nearest), "postures": postures})
+    nearest = min(parts, key=lambda part: part.mm)
+    first_hit = next((part for part in parts if not part.free), nearest)
+    return replace(first_hit, mm=nearest.mm, postures=postures)
 
 
 def check_free(trajectory: Trajectory, place: str = "") -> None:
@@ -144,7 +149,7 @@ def prove_plan(plan: PathPlan) -> PathPlan:
     s = float(plan.s(hit_time(plan.motion, proof)))
     least_clearance = proof.mm if np.isfinite(proof.mm) else None
     plan.clearance = {"mm": least_clearance, "s_mm": s, "body": proof.body, "with": proof.keep_out}
-    if proof.free or plan.arm.ignores_keep_out:
+    if proof.free:
         if plan.approach is not None:
             check_free(plan.approach, " on the way to the path's start")
         return plan
