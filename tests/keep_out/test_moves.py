@@ -51,6 +51,18 @@ def test_a_jog_stands_before_the_hit(robot: str, table: str) -> None:
     assert free.json["joints"][1] < 70.0  # it went until the table was near
 
 
+@pytest.mark.parametrize("robot", KINDS)
+def test_a_jog_that_ignores_tells_what_it_passes_through(robot: str, table: str) -> None:
+    words = ["jog", robot, "--port", "sim", "--scene", table, "--ignore-keep-out", "--json"]
+    completed = run(*words, "q2", "-60", "--seconds", "1.5")
+    assert completed.code == 0, completed.err
+    [depth] = re.findall(r"--ignore-keep-out: this motion hits table by (\d+\.\d) mm \(q3\)", completed.err)
+    arm = armkin.load(robot, scene=table)
+    way = np.linspace(arm.home, np.deg2rad(completed.json["joints"]), 2000)
+    assert -float(depth) == pytest.approx(float(np.min(armkin.clearance(arm, way).mm)), abs=0.1)
+    assert "this motion" not in run(*words, "q1", "30", "--seconds", "0.5").err
+
+
 def test_a_jog_ends_so_early_that_it_stands_at_the_hit(table: str, monkeypatch: pytest.MonkeyPatch) -> None:
     arm = armkin.load("three_dof", scene=table)
     way: list[float] = []

@@ -20,13 +20,12 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.motion_start import check_jog, jog_goal
+from armkin.board.backend.motion_start import check_jog, jog_motion
 from armkin.board.backend.sent_positions import plan_targets
 from armkin.board.ports import BAUD, SIM, SerialPort, list_ports
 from armkin.errors import LinkError, UsageError
-from armkin.motion.joint_moves import rate_lines, straight_move
+from armkin.motion.joint_moves import rate_lines
 from armkin.motion.timing.trajectory import Trajectory
-from armkin.motors import legal_with_same_pulses
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend, Planned, StoppedError
@@ -216,13 +215,11 @@ class Board(ABC):
         arm, seconds_left = self.arm, seconds
         while seconds_left > 0 and (goes_on is None or goes_on()):
             piece_time = seconds_left if goes_on is None else min(JOG_PIECE, seconds_left)
-            counts = self.machine.counts()
-            present = legal_with_same_pulses(arm, self.machine.joints())
-            goal = jog_goal(arm, present, joint, rate * piece_time, refuse=seconds_left == seconds)
-            move = straight_move(arm, self.machine.joints(), goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
-            if not move.duration:
+            counts, present = self.machine.counts(), self.machine.joints()
+            motion = jog_motion(arm, present, joint, rate, piece_time, refuse=seconds_left == seconds)
+            if not motion.duration:
                 return  # the joint stands at its limit, or before a keep-out
-            self.machine.run([self.plan_trajectory(Trajectory(arm, move.start, (move,)), np.array(counts))])
+            self.machine.run([self.plan_trajectory(motion, np.array(counts))])
             seconds_left -= piece_time
 
     # Capabilities

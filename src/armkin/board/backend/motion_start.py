@@ -17,14 +17,14 @@ from armkin.board.ports import LOG
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.limits import SLACK, limit_fields, outside_text
 from armkin.model.units import TURN
+from armkin.motion.joint_moves import straight_move
 from armkin.motion.plan.trajectory_proof import check_free, free_way
-from armkin.motion.timing.trajectory import Straight
+from armkin.motion.timing.trajectory import Straight, Trajectory
 from armkin.motors import joints, legal_with_same_pulses, pulses, resolution
 
 if TYPE_CHECKING:
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
-    from armkin.motion.timing.trajectory import Trajectory
 
 _SAMPLES = 256  # samples of a curve that are tested if it begins outside the limits
 
@@ -67,7 +67,18 @@ def check_start(trajectory: Trajectory, start: NDArray[np.int64]) -> None:
             raise _farther_out_error(arm, int(goes_farther.argmax()), trajectory.start)
 
 
-def jog_goal(arm: Arm, present: Array, joint: int, change: float, *, refuse: bool) -> Array:
+def jog_motion(arm: Arm, start: Array, joint: int, rate: float, seconds: float, *, refuse: bool = False) -> Trajectory:
+    """The motion of a jog of one joint [rad/s | mm/s] from joint values (n,), stopped at its limit and before a hit.
+
+    It lasts no time where the joint stands at its limit. refuse: raise NoSolutionError if it cannot move at all before
+    a hit.
+    """
+    goal = _jog_goal(arm, legal_with_same_pulses(arm, start), joint, rate * seconds, refuse=refuse)
+    move = straight_move(arm, start, goal, min(float(abs(rate) / arm.max_speed[joint]), 1.0))
+    return Trajectory(arm, start, (move,))
+
+
+def _jog_goal(arm: Arm, present: Array, joint: int, change: float, *, refuse: bool) -> Array:
     """The joint values (n,) after a change of one joint, stopped at its limit and two steps before a hit.
 
     refuse: raise NoSolutionError if the joint cannot move at all before a hit.

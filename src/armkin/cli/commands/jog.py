@@ -37,6 +37,7 @@ def jog(
     The board stops by itself when this command is gone, and before the joint limits and keep-outs if the position
     is known.
     """
+    from armkin.board.backend.motion_start import jog_motion
     from armkin.board.planner import where_arm_stands
     from armkin.model.lock_joints import joint_index
 
@@ -57,6 +58,8 @@ def jog(
         if allowed != joint_rate:
             allowed_speed = abs(rate * allowed / joint_rate)
             output.warn(f"the position is lost: {allowed_speed:g} instead of {speed}, and no limits")
+        if machine.position() != "lost":
+            keep_outs.tell_ignored([jog_motion(arm, machine.joints(), j, allowed, time)])
         board.jog(j, allowed, time)
         answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
     with output.destination(None) as write:
