@@ -114,6 +114,39 @@ def test_ignoring_is_told_and_lasts_for_one_command(table: str) -> None:
     assert (path.code, "this motion hits table" in path.err) == (0, True)
 
 
+IN_THE_FLOOR = "0,-5,-60"
+
+
+@pytest.mark.parametrize("words", [
+    ["send", "three_dof", "0", "20", "-60", "--from", IN_THE_FLOOR, "--dry-run"],
+    ["send", "three_dof", "--path", "PATH", "--from", IN_THE_FLOOR, "--dry-run"],
+    ["send", "three_dof", "0", "20", "-60", "--assume", IN_THE_FLOOR, "--port", "sim"],
+    ["path", "three_dof", "PATH", "--start", IN_THE_FLOOR],
+    ["path", "three_dof", "--via", "390,80,300", "--via", "390,-80,200", "--start", IN_THE_FLOOR],
+    ["path", "three_dof", "PATH", "--assume", IN_THE_FLOOR, "--port", "sim"],
+])  # fmt: skip
+def test_an_arm_that_stands_in_a_hit_is_told_so_by_plans_too(words: list[str], tmp_path: Path) -> None:
+    floor, path = tmp_path / "floor.yaml", tmp_path / "path.yaml"
+    floor.write_text("keep_out: [{floor: 20}]\n")
+    path.write_text("{start: {point: [390, 80, 300]}, moves: [{line: [390, -80, 200]}]}\n")
+    words = [str(path) if word == "PATH" else word for word in words]
+    depth = run("fk", "three_dof", *IN_THE_FLOOR.split(","), "--scene", floor, "--json").json["hits"][0]["depth_mm"]
+    completed = run(*words, "--scene", floor)
+    assert completed.code == 0, completed.err
+    told = f"the arm stands in a hit: it hits floor by {depth:.1f} mm (q3): it may move out, and no farther in\n"
+    assert completed.err.count(told) == 1
+    assert "stands in a hit" not in run(*words).err
+
+
+def test_a_jog_from_a_hit_is_told_so(tmp_path: Path) -> None:
+    box = tmp_path / "box.yaml"
+    box.write_text("keep_out:\n  - box: {min: [200, -100, 300], max: [500, 100, 600]}\n")
+    for more, allowance in (([], ": it may move out, and no farther in"), (["--ignore-keep-out"], "")):
+        completed = run("jog", "three_dof", "q1", 50, "--seconds", 1, "--port", "sim", "--scene", box, *more)
+        assert completed.code == 0, completed.err
+        assert f"the arm stands in a hit: it hits box 1 by 70.5 mm (q3){allowance}\n" in completed.err
+
+
 def test_a_piped_answer_keeps_its_scene(table: str, tmp_path: Path) -> None:
     answer = run("ik", "three_dof", "390", "80", "300", "--scene", table, "--json").out.encode()
     assert b'"scene_sha256"' in answer

@@ -69,8 +69,9 @@ def show_plan(
 def plan_from(start: str | None, option: str, question: PathQuestion, *, json: bool) -> PathPlan:
     """The plan from the joint values of an option, without motion."""
     arm = board_link.arm_for_plan(question.arm)
-    begin = {} if start is None else {"start": board_link.standing_joints(arm, start, option)}
-    return _make_plan(question._replace(arm=arm, options=question.options | begin), json=json)
+    begin = arm.home if start is None else board_link.standing_joints(arm, start, option)
+    keep_outs.tell_start_hit(arm, begin)
+    return _make_plan(question._replace(arm=arm, options=question.options | {"start": begin}), json=json)
 
 
 def carry_out_path(question: PathQuestion, link: Link, out: str | None, plot: str | None, *, json: bool) -> None:

@@ -13,6 +13,7 @@ from armkin.errors import UsageError
 
 if TYPE_CHECKING:
     from armkin.board.backend import Backend
+    from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
 
@@ -68,11 +69,17 @@ def check_port(port: str, arm: Arm, no_scene: bool, *, simulated: bool = False) 
 def check_start(machine: Backend, arm: Arm, no_scene: bool) -> None:
     """Check the scene of an open board's port, as `check_port` does, and tell if the arm stands in a hit."""
     check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
-    if not arm.keep_out or machine.position() == "lost":
+    if machine.position() != "lost":
+        tell_start_hit(arm, machine.joints())
+
+
+def tell_start_hit(arm: Arm, q: Array) -> None:
+    """Tell if an arm that moves from joint values (n,) [rad | mm] stands in a hit."""
+    if not arm.keep_out:
         return
     from armkin.keep_out.clearance import hits, hits_text
 
-    [(_, hit)] = hits(arm, machine.joints()[None])
+    [(_, hit)] = hits(arm, q[None])
     if hit:
         allowance = "" if arm.ignores_keep_out else ": it may move out, and no farther in"
         output.note(f"the arm stands in a hit: it {hits_text(hit)}{allowance}")

@@ -52,13 +52,14 @@ def jog(
     if abs(rate) > top * (1 + 1e-9) or rate == 0:
         raise UsageError(f"SPEED: {speed} must be from -{top:g} to {top:g}, and not 0")
     with board_link.open_backend(board, port, baud, reset=not no_reset) as machine:
-        keep_outs.check_start(machine, arm, no_scene)
+        keep_outs.check_port(machine.port.name, arm, no_scene, simulated=machine.port.simulated)
         joint_rate = float(units.joints_in(arm, [rate] * arm.n)[j])
         allowed = board.ready_to_jog(j, joint_rate)
         if allowed != joint_rate:
             allowed_speed = abs(rate * allowed / joint_rate)
             output.warn(f"the position is lost: {allowed_speed:g} instead of {speed}, and no limits")
-        if machine.position() != "lost":
+        if machine.position() != "lost":  # a simulated board knows it since it got ready
+            keep_outs.tell_start_hit(arm, machine.joints())
             keep_outs.tell_ignored([jog_motion(arm, machine.joints(), j, allowed, time)])
         board.jog(j, allowed, time)
         answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}

@@ -239,7 +239,9 @@ def _dry_run(planner: Planner, goals: Goals | Stream, start: str | None, trace: 
 
     arm = planner.arm
     begin = arm.home if start is None else board_link.standing_joints(arm, start, "--from")
-    plans = _all_plans(planner, goals, planner.counts(begin))
+    start_counts = planner.counts(begin)
+    keep_outs.tell_start_hit(arm, armkin.joints(arm, start_counts))
+    plans = _all_plans(planner, goals, start_counts)
     _write_trace(arm, plans, trace)
     plan_totals = Total(arm, plans).summary()
     with output.answer_stream(trace) as write:
