@@ -12,6 +12,8 @@ import pytest
 
 import armkin
 from armkin.board.firmware import jogging
+from armkin.cli.app import load_command
+from armkin.cli.commands import COMMANDS
 from armkin.formula.arrays import Array
 from command_line import run
 
@@ -173,6 +175,27 @@ def test_a_port_remembers_its_scene(table: str, tmp_path: Path, monkeypatch: pyt
     keep_outs.check_port("/dev/ttyX", bare, False)
     keep_outs.check_port("sim", inside, False, simulated=True)
     keep_outs.check_port("sim", bare, False)
+
+
+WITHOUT_SCENE = {
+    "send": ["0", "20", "-60"],
+    "path": ["--via", "390,80,300", "--via", "390,-80,230"],
+    "jog": ["q1", "5"],
+    "home": [],
+    "teach": [],
+    "begin": ["--out", "mine.yaml"],
+}
+
+
+def test_a_scene_and_no_scene_are_refused_together(table: str) -> None:
+    options = {name: {param.name for param in load_command(name).params} for name in COMMANDS}
+    assert {name for name in COMMANDS if {"scene", "no_scene"} <= options[name]} == set(WITHOUT_SCENE)
+    for name, words in WITHOUT_SCENE.items():
+        for more in (["--port", "sim"], *([["--dry-run"]] if "dry_run" in options[name] else [])):
+            for contradiction in (["--no-scene", "--scene", table], ["--scene", table, "--no-scene"]):
+                completed = run(name, "three_dof", *words, *more, *contradiction)
+                assert (completed.code, completed.out) == (2, "")
+                assert "--scene and --no-scene contradict each other: leave one away" in completed.err
 
 
 def test_path_tells_its_clearance(table: str) -> None:

@@ -28,6 +28,12 @@ NoScene = Annotated[
 _POSTURE_COUNT = 4001  # postures of a motion in which hits that are ignored are looked for
 
 
+def check_together(scene: str | None, no_scene: bool) -> None:
+    """Raise UsageError for `--scene` and `--no-scene`: the port would keep the scene that it was to forget."""
+    if scene is not None and no_scene:
+        raise UsageError("--scene and --no-scene contradict each other: leave one away")
+
+
 def load_moving_arm(robot: str, scene: str | None, ignore: bool = False, tool: str | None = None) -> Arm:
     """The arm of a command that moves it; radii that are assumed are named."""
     return mark_ignored(arguments.load_arm(robot, scene, tool), ignore)

@@ -44,6 +44,7 @@ def begin(
     from armkin.board import commissioning
     from armkin.robot_file.catalogue import locate, shipped_file
 
+    keep_outs.check_together(scene, no_scene)
     path = locate(robot)
     if out is None and shipped_file(robot) is not None and path == str(shipped_file(robot)):
         raise UsageError(f"{robot} is a shipped robot, which stays as it is: add --out MINE.yaml")

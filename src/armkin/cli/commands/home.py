@@ -52,6 +52,7 @@ def home(
     """
     from armkin.board.planner import where_arm_stands
 
+    keep_outs.check_together(scene, no_scene)
     arm = keep_outs.load_moving_arm(robot, scene)
     if arm.keep_out:
         output.note("the search for the switches is not proved free of keep-outs; the move after it is")

@@ -41,6 +41,7 @@ def jog(
     from armkin.board.planner import where_arm_stands
     from armkin.model.lock_joints import joint_index
 
+    keep_outs.check_together(scene, no_scene)
     arm = board_link.arm_for_port(keep_outs.load_moving_arm(robot, scene, ignore_keep_out), port)
     board = board_link.board_of(arm, rehearsal=port == board_link.SIM)
     j = joint_index(arm, joint)

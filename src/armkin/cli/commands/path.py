@@ -72,6 +72,7 @@ def path(
     The branch that carries the whole way, within all limits, as fast as the joints allow; where none does: how
     far each one goes, and why no farther. Nothing moves unless the whole path is planned.
     """
+    keep_outs.check_together(scene, no_scene)
     if start is not None and port is not None and not dry_run:
         raise UsageError("--start belongs to a plan: with --port the arm starts where it stands")
 

@@ -112,6 +112,7 @@ def send(
     """
     from armkin.board.planner import Planner
 
+    keep_outs.check_together(scene, no_scene)
     fraction = arguments.percent(speed, "--speed")
     rehearsal = dry_run or port == SIM
     _check_together(start, accel, trace, batch, dry_run=dry_run, rehearsal=rehearsal)

@@ -37,6 +37,7 @@ def teach(
     from armkin.teach.server import Server
     from armkin.teach.urdf_meshes import meshes_json as read_meshes
 
+    keep_outs.check_together(scene, no_scene)
     arm = keep_outs.load_moving_arm(robot, scene)
     if port is not None and port != SIM:
         from armkin.board.ports.serial_port import check_port
