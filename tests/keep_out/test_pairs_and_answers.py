@@ -177,6 +177,27 @@ def test_names_of_bodies_are_taken(tmp_path: Path) -> None:
         armkin.load("three_dof", scene=path)
 
 
+@pytest.mark.parametrize(
+    ("scene", "line", "words"),
+    [
+        ("  - box: {size: [9, 9, 9]}\n    name: box 1\n", 2, "keep_out 1: a keep-out named box 1 is there already"),
+        ("  - self\n  - floor: -60\n    name: floor\n", 3, "keep_out 2: a keep-out named floor is there already"),
+        ("  - floor: -60\n    name: base\n", 3, "keep_out 1: name: base is the name of one of the arm's bodies"),
+        ("  - self\n  - floor: -60\n    name: q1\n", 4, "keep_out 2: name: q1 is the name of one of the arm's bodies"),
+    ],
+)
+def test_a_name_that_clashes_with_the_robots_stands_in_a_line_of_the_scene(
+    scene: str, line: int, words: str, tmp_path: Path
+) -> None:
+    robot, path = tmp_path / "robot.yaml", tmp_path / "scene.yaml"
+    robot.write_text(SLIDE.replace("floor: -50]", "floor: -50, box: {min: [500, 0, 0], max: [600, 9, 9]}]"))
+    path.write_text(f"keep_out:\n{scene}")
+    with pytest.raises(RobotFileError) as raised:
+        armkin.load(robot, scene=path)
+    assert str(raised.value).startswith(f"{path}:{line}: {words}")
+    assert (raised.value.fields["file"], raised.value.fields["line"]) == (str(path), line)
+
+
 def test_the_refusal_has_fields() -> None:
     from armkin.inverse import choose_branch
 

@@ -13,7 +13,7 @@ from armkin.formula.arrays import Array
 from armkin.keep_out.bodies import Bodies, bodies, segment_ends
 from armkin.keep_out.shapes import Shape, shape_of
 from armkin.keep_out.shapes.segment_distances import segment_distance
-from armkin.robot_file.keep_out_keys import SELF, keep_out_names, keep_out_problems
+from armkin.robot_file.keep_out_keys import SELF, keep_out_names
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -215,10 +215,8 @@ def _radical_inverse(index: int, base: int) -> float:
 
 
 def check_keep_out(arm: Arm) -> None:
-    """Raise RobotFileError for names that clash, and for an obstacle that is hit in every sampled posture."""
+    """Raise RobotFileError for an obstacle that is hit in every sampled posture."""
     source = arm.scene or arm.path or arm.name
-    for path, text in keep_out_problems(arm.keep_out, ["base", *arm.joint_names]):
-        raise RobotFileError(f"{source}: keep_out {int(path[1]) + 1}: {text}", file=source)
     arm_guard = guard(arm)
     clearances = arm_guard.clearances(sample_postures(arm))
     for name, _ in arm_guard.obstacles:

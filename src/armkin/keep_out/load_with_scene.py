@@ -49,7 +49,14 @@ def load(
 
 
 def arm_in_scene(file: RobotFile, scene: Scene | None = None, tool: Sequence[float] | None = None) -> Arm:
-    """The arm of a robot file and a scene. Raises RobotFileError if a keep-out is hit in every posture."""
+    """The arm of a robot file and a scene.
+
+    Raises RobotFileError if names of the two clash, or a keep-out is hit in every posture.
+    """
+    if scene is not None:
+        from armkin.robot_file.scene_file import check_names_beside
+
+        check_names_beside(file, scene)
     arm = arm_of_file(file, scene, tool)
     if arm.keep_out:
         from armkin.keep_out.body_pairs import check_keep_out

@@ -1,9 +1,12 @@
 """Scenes: keep-outs in a file of their own, which are added to those of a robot file."""
 
+from __future__ import annotations
+
 import hashlib
 import os
+from collections.abc import Iterable
 from operator import itemgetter
-from typing import NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from pydantic import Field, PrivateAttr, ValidationError
 
@@ -12,6 +15,9 @@ from armkin.robot_file import keep_out_keys as entries
 from armkin.robot_file import robot_key_errors, strict_yaml
 from armkin.robot_file.key_types import Model
 from armkin.robot_file.robot_keys import KeepOut, Size
+
+if TYPE_CHECKING:
+    from armkin.robot_file.robot import RobotFile
 
 _KIND = strict_yaml.Kind("scene", "keep_out", "keep_out: [self, floor: 0]", 1024 * 1024, 50_000)
 _MAX_PROBLEMS = 20  # problems that are told at once
@@ -23,6 +29,7 @@ class Scene(Model):
     clearance: Size = Field(0.0, description="How far the arm keeps from every keep-out, in mm.")
     keep_out: KeepOut = Field(description="Where the arm must not go: self, floors, boxes, capsules.")
 
+    _document: strict_yaml.Document = PrivateAttr(strict_yaml.Document({}, {(): 0}))
     _path: str = PrivateAttr("")
     _sha256: str = PrivateAttr("")
 
@@ -64,11 +71,25 @@ def parse_scene(raw: bytes | str, name: str = "scene.yaml") -> Scene:
             if text.startswith("unknown key") and len(path) == 1:
                 text = "unknown key; a scene has clearance and keep_out"
             problems.append((path, text))
-        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in problems])
-    scene._path, scene._sha256 = name, hashlib.sha256(encoded).hexdigest()
+        _refuse(name, _with_lines(document, problems))
+    scene._document, scene._path, scene._sha256 = document, name, hashlib.sha256(encoded).hexdigest()
     if scene_problems := list(entries.keep_out_problems(scene.keep_out)):
-        _refuse(name, [(document.line(path), f"{_place_text(path)}{text}") for path, text in scene_problems])
+        _refuse(name, _with_lines(document, scene_problems))
     return scene
+
+
+def check_names_beside(robot: RobotFile, scene: Scene) -> None:
+    """Raise RobotFileError, with the scene's line, for names that the robot's bodies or keep-outs have already."""
+    bodies = ["base", *(joint.name for joint in robot.joints)]
+    if problems := list(entries.keep_out_problems(scene.keep_out, bodies, robot.keep_out)):
+        _refuse(scene.path, _with_lines(scene._document, problems))
+
+
+def _with_lines(
+    document: strict_yaml.Document, problems: Iterable[tuple[strict_yaml.Path, str]]
+) -> list[tuple[int, str]]:
+    """Problems as their lines and texts, which begin with the place."""
+    return [(document.line(path), f"{_place_text(path)}{text}") for path, text in problems]
 
 
 def _place_text(path: strict_yaml.Path) -> str:
