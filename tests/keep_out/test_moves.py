@@ -222,3 +222,11 @@ def test_rows_that_stream_in_are_proved_one_by_one(table: str) -> None:
     completed = run("send", "three_dof", "--batch", "-", "--port", "sim", "--scene", table, stdin=rows)
     assert completed.code == 3
     assert "row 2: q3 would hit table" in completed.err
+
+
+def test_rows_that_come_one_by_one_are_told_before_they_pass_through_something(table: str) -> None:
+    rows = b"0,60,-90\n0,20,-90\n0,60,-90\n0,15,-90\n"
+    for option in (("--port", "sim"), ("--dry-run",)):
+        completed = run("send", "three_dof", "--batch", "-", *option, "--scene", table, "--ignore-keep-out", stdin=rows)
+        assert completed.code == 0
+        assert completed.err.count("--ignore-keep-out: this motion hits table by") == 1

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Iterator
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,7 +12,7 @@ from armkin.cli.printing import output
 from armkin.errors import UsageError
 
 if TYPE_CHECKING:
-    from armkin.board.backend import Backend
+    from armkin.board.backend import Backend, Planned
     from armkin.formula.arrays import Array
     from armkin.model.arm import Arm
     from armkin.motion.timing.trajectory import Trajectory
@@ -91,8 +91,17 @@ def tell_start_hit(arm: Arm, q: Array) -> None:
         output.note(f"the arm stands in a hit: it {hits_text(hit)}{allowance}")
 
 
-def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
-    """What motions pass through under `--ignore-keep-out`."""
+def telling_ignored(plans: Iterable[Planned | None]) -> Iterator[Planned | None]:
+    """Plans as they come, each told before it is carried out if it passes through what none before it did."""
+    told = set[tuple[str, str]]()
+    for plan in plans:
+        if plan is not None:
+            told |= tell_ignored([plan.trajectory], told)
+        yield plan
+
+
+def tell_ignored(trajectories: Iterable[Trajectory], told: Collection[tuple[str, str]] = ()) -> set[tuple[str, str]]:
+    """What motions pass through under `--ignore-keep-out`, pairs that are `told` apart; the names of these pairs."""
     import numpy as np
 
     from armkin.keep_out.body_pairs import guard
@@ -101,15 +110,17 @@ def tell_ignored(trajectories: Iterable[Trajectory]) -> None:
     deepest: dict[tuple[str, str], float] = {}
     for trajectory in trajectories:
         if not trajectory.arm.keep_out or not trajectory.arm.ignores_keep_out:
-            return
+            return set()
         held = guard(trajectory.arm)
         t = np.linspace(0.0, trajectory.duration, _POSTURE_COUNT)
         least_clearances = held.clearances(trajectory.q(t)).min(axis=0, initial=np.inf)
         for k in np.flatnonzero(least_clearances < 0).tolist():
-            deepest[held.pair_names(k)] = max(deepest.get(held.pair_names(k), 0.0), float(-least_clearances[k]))
+            if (pair := held.pair_names(k)) not in told:
+                deepest[pair] = max(deepest.get(pair, 0.0), float(-least_clearances[k]))
     if deepest:
         deepest_first = sorted(deepest.items(), key=lambda item: -item[1])
         words = hits_text(
             [{"body": body, "with": obstacle, "depth_mm": depth} for (body, obstacle), depth in deepest_first]
         )
         output.warn(f"--ignore-keep-out: this motion {words}")
+    return set(deepest)

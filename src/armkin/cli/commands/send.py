@@ -198,9 +198,8 @@ def _plan_and_move(
         start_counts = machine.counts() if held is None else held.start
         if isinstance(goals, Stream):
             with output.progress("ms of motion", None) as tick:  # how many rows will come is not known
-                machine.run(
-                    planner.sum_up(goals.plans(planner, start_counts)), lambda elapsed, _: tick(round(1000 * elapsed))
-                )
+                row_plans = keep_outs.telling_ignored(goals.plans(planner, start_counts))
+                machine.run(planner.sum_up(row_plans), lambda elapsed, _: tick(round(1000 * elapsed)))
         else:
             with planning():
                 plans = _all_plans(planner, goals, start_counts)  # every refusal before anything moves
@@ -292,9 +291,10 @@ def _all_plans(planner: Planner, goals: Goals | Stream, start: Sequence[int]) ->
     from armkin.board.planner import Stream
 
     if isinstance(goals, Stream):
-        return goals.all_plans(planner, start)
-    near = armkin.joints(planner.arm, list(start))
-    plans = [planner.plan(start, goals.resolve(planner.arm, near))]
+        plans = goals.all_plans(planner, start)
+    else:
+        near = armkin.joints(planner.arm, list(start))
+        plans = [planner.plan(start, goals.resolve(planner.arm, near))]
     keep_outs.tell_ignored([plan.trajectory for plan in plans])
     return plans
 
