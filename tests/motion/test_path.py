@@ -184,3 +184,16 @@ def test_postures_that_fail_leave_nothing_behind(three_dof: Arm) -> None:
     assert plan.length == pytest.approx(alone.length) == pytest.approx(np.linalg.norm(tool) + np.linalg.norm(base))
     assert (plan.samples, len(plan.runs)) == (alone.samples, 1)
     assert plan.duration == pytest.approx(approach.duration + alone.duration)
+
+
+@pytest.mark.parametrize("jerk", [100.0, 1000.0, 5000.0])
+def test_the_deviation_tells_how_far_the_average_that_limits_jerk_leaves_a_circle(jerk: float) -> None:
+    centre, radius = np.array([360.0, 80.0, 300.0]), 30.0
+    moves = {"start": {"point": [390, 80, 300]}, "moves": [{"circle": {"centre": centre.tolist()}}]}
+    arm = armkin.load("three_dof")
+    plan = armkin.path(arm, moves, jerk=np.deg2rad(jerk))
+    tips = armkin.fk(arm, plan.motion.q(np.linspace(0.0, plan.motion.duration, 2000)))[:, :3, 3] - centre
+    away = np.hypot(np.hypot(tips[:, 0], tips[:, 1]) - radius, tips[:, 2]).max()
+    assert 0.02 < away <= plan.deviation + 1e-6
+    assert plan.deviation < 1.01 * away
+    assert armkin.path(arm, moves).deviation < 1e-3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,12 +12,14 @@ from armkin.forward import jacobian, position
 from armkin.motion.branches.joint_steps import chord_bound, levers
 from armkin.motion.branches.solve_on_route import DAMPING, correct_to_route, exact_cubics
 from armkin.motion.timing.cubic_knots import Knots
+from armkin.motion.timing.limit_jerk import Smoothed
 from armkin.motion.timing.time_optimal import knots_of_samples
 from armkin.motion.tool_path.path_pieces import divide_spans
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branches.wrist_window import Window
+    from armkin.motion.timing.curved_stretch import Curve
     from armkin.motion.tool_path.route import Route
 
 _MAX_POINT_FACTOR = 16.0  # refinement multiplies the number of points by at most this
@@ -29,6 +32,7 @@ _MIN_POINTS = 2  # fewest points of a section with exact slopes
 _GROWTH_RATIO = 2.5  # greatest ratio of neighbouring intervals: speed changes quickly near a bend
 _EXCESS_FACTOR = 1.3  # excess over that ratio that is not worth a division
 _AROUND_LENGTH = 0.5  # search range [mm] to either side of a given point
+_FAR_STEPS = 12  # Newton steps, of 1 mm at most, from the middle of a window to where its average is nearest
 _SAME_DISTANCE = 1e-3  # distances that differ by less count as equal; the first place is reported
 _REST_INTERVALS = 32  # fewest intervals between two rests
 _MOTION_SHARE = 0.7  # share of the grid spaced by joint motion; the rest is spaced by length
@@ -246,15 +250,8 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
     s, points = s[on_path], points[on_path]
     miss: Missed = None
     for i in range(0, len(s), _BLOCK_POINTS):
-        nearest, given_points = s[i : i + _BLOCK_POINTS], points[i : i + _BLOCK_POINTS]
-        distance = np.full(len(nearest), np.inf)  # least of all steps: in a tight corner the search may move away
-        for _ in range(3):  # Newton steps to the nearest place
-            q, slope = path.evaluate(np.clip(nearest, path.s[0], path.s[-1]))
-            offsets = given_points - position(arm, q)[:, : given_points.shape[1]]
-            distance = np.minimum(distance, np.linalg.norm(offsets, axis=1))
-            tangent = (np.asarray(jacobian(arm, q)[:, : given_points.shape[1]]) @ slope[:, :, None])[..., 0]
-            size = np.maximum((tangent**2).sum(axis=1), 1e-300)
-            nearest = nearest + np.clip((offsets * tangent).sum(axis=1) / size, -1.0, 1.0)
+        given_points = points[i : i + _BLOCK_POINTS]
+        distance = _distances(arm, path, given_points, s[i : i + _BLOCK_POINTS])
         row, checked = -1, set[int]()
         while row not in checked:  # the search may fail in a tight bend: sample around the worst point
             checked.add(row)
@@ -267,6 +264,33 @@ def largest_miss(arm: Arm, route: Route, path: Knots) -> Missed:
             miss = greatest, float(s[i + int((distance >= greatest * (1 - _SAME_DISTANCE)).argmax())])
         miss = max(greatest, miss[0]), miss[1]
     return miss
+
+
+def _distances(arm: Arm, path: Knots, points: Array, nearest: Array, steps: int = 3) -> Array:
+    """Distances [mm] of points (M, 2 or 3) from the tip's path, by Newton steps from places (M,) near them."""
+    distance = np.full(len(nearest), np.inf)  # least of all steps: in a tight corner the search may move away
+    for _ in range(steps):
+        q, slope = path.evaluate(np.clip(nearest, path.s[0], path.s[-1]))
+        offsets = points - position(arm, q)[:, : points.shape[1]]
+        distance = np.minimum(distance, np.linalg.norm(offsets, axis=1))
+        tangent = (np.asarray(jacobian(arm, q)[:, : points.shape[1]]) @ slope[:, :, None])[..., 0]
+        size = np.maximum((tangent**2).sum(axis=1), 1e-300)
+        nearest = nearest + np.clip((offsets * tangent).sum(axis=1) / size, -1.0, 1.0)
+    return distance
+
+
+def smoothing_shift(arm: Arm, curves: Sequence[Curve | Smoothed]) -> float:
+    """How far [mm] the moving average that limits the jerk takes the tip from its path, asked twice an interval."""
+    shift = 0.0
+    for stretch in curves:
+        if not isinstance(stretch, Smoothed):
+            continue
+        grid = stretch.curve.times + 0.5 * stretch.window
+        times = np.concatenate([grid, 0.5 * (grid[1:] + grid[:-1])])
+        for t in np.array_split(times, -(-len(times) // _BLOCK_POINTS)):
+            points = position(arm, stretch.evaluate(t))
+            shift = max(shift, float(_distances(arm, stretch.curve.path, points, stretch.lengths(t), _FAR_STEPS).max()))
+    return shift
 
 
 def _deviations(arm: Arm, route: Route, path: Knots, intervals: Int, lever: Array) -> Array:

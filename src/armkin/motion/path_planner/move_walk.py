@@ -26,7 +26,7 @@ from armkin.motion.path_planner.target_postures import target_postures
 from armkin.motion.path_planner.timed_run import note_deviation, timed_curves
 from armkin.motion.plan.path_plan import Marker, PathPlan, copy_plan
 from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, join_joint_paths, joint_path
+from armkin.motion.timing.limit_jerk import Smoothed, joint_path
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers
@@ -284,7 +284,7 @@ class Walk:
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        note_deviation(self.plan, route, join_joint_paths(curves), misses)
+        note_deviation(self.plan, route, curves, misses)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""

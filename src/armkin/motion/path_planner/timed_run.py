@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from armkin.errors import NoSolutionError
 from armkin.formula.arrays import Array
 from armkin.motion.branches.branch_path import Pace, run_stretches
-from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation
+from armkin.motion.branches.route_grid import Missed, largest_miss, route_deviation, smoothing_shift
 from armkin.motion.plan.path_plan import PathPlan
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.limit_jerk import Smoothed, join_joint_paths
@@ -17,7 +18,6 @@ from armkin.motion.tool_path.dense_points import PLAN_SHARES
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
     from armkin.motion.branches.branch_chains import Run
-    from armkin.motion.timing.cubic_knots import Knots
     from armkin.motion.tool_path.route import Route
 
 
@@ -31,6 +31,8 @@ def timed_curves(
         tight_pace = replace(pace, tolerance=share * pace.tolerance)
         curves = run_stretches(arm, route, s, run, near, tight_pace, fixed=fixed)
         misses = largest_miss(arm, route, join_joint_paths(curves))
+        if misses is not None:
+            misses = misses[0] + smoothing_shift(arm, curves), misses[1]
         largest = 0.0 if misses is None else misses[0]
         if largest <= pace.tolerance:
             return curves, misses
@@ -42,9 +44,13 @@ def timed_curves(
     )
 
 
-def note_deviation(plan: PathPlan, route: Route, path: Knots, misses: Missed) -> None:
+def note_deviation(plan: PathPlan, route: Route, curves: Sequence[Curve | Smoothed], misses: Missed) -> None:
     """Note how far a curve leaves the route, or given points, and how near it comes to a singularity."""
-    deviation_mm = route.largest_detour + route_deviation(plan.arm, route, path) if misses is None else misses[0]
+    path = join_joint_paths(curves)
+    if misses is None:
+        deviation_mm = route.largest_detour + route_deviation(plan.arm, route, path) + smoothing_shift(plan.arm, curves)
+    else:
+        deviation_mm = misses[0]
     if misses is not None and deviation_mm > plan.deviation:
         plan.rounded_most = plan.length + misses[1]
     plan.deviation = max(plan.deviation, deviation_mm)
