@@ -15,7 +15,7 @@ from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, smoothing_window
+from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, knots_of_samples, optimal_law, refine_knots
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -66,11 +66,15 @@ def time_law(
     parameter = np.arange(len(values), dtype=float) if s is None else np.asarray(s, dtype=float)
     _check_samples(arm, values, parameter)
     path = refine_knots(knots_of_samples(parameter, values))
-    limits: Array = arm.max_accel * accel
-    bounds = Bounds(arm.max_speed * speed, limits, _speed_cap(arm, path, tool_speed, hold))
-    curve = Curve(path, optimal_law(path, bounds, coupled_motors(arm, accel)))
-    stretch = curve if jerk is None else Smoothed(curve, smoothing_window(limits, jerk))
-    return Trajectory(arm, values[0], (stretch,))
+    cap = _speed_cap(arm, path, tool_speed, hold)
+
+    def timed(share: float) -> list[Curve | Smoothed]:
+        limits: Array = arm.max_accel * accel * share
+        x = optimal_law(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel * share))
+        curve = Curve(path, x)
+        return [curve if jerk is None else Smoothed(curve, smoothing_window(limits, jerk))]
+
+    return Trajectory(arm, values[0], tuple(timed(1.0) if jerk is None else fastest_timing(timed)))
 
 
 def _check_samples(arm: Arm, values: Array, parameter: Array) -> None:

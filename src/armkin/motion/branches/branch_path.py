@@ -27,7 +27,7 @@ from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, smoothing_window
+from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, optimal_law, refine_knots
 from armkin.motion.tool_path.route import Route
 from armkin.motors import motor_accel
@@ -223,18 +223,21 @@ def _check_deviation(path: Knots, deviation: Array, pace: Pace) -> None:
 def _time_path(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | Smoothed]:
     """The time-optimal curves on a grid, one from each rest to the next."""
     cap, fraction = _speed_caps(arm, route, path, pace)
-    accel = arm.max_accel * pace.accel
-    window = 0.0
-    if pace.jerk is not None:
-        window = smoothing_window(accel, pace.jerk)
-        cap = np.minimum(cap, _smoothing_cap(arm, path, window, pace.tolerance))
     speed = fraction[:, None] * arm.max_speed
-    x = optimal_law(path, Bounds(speed, accel, cap), coupled_motors(arm, pace.accel))
-    curves: list[Curve | Smoothed] = []
-    for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)]):
-        curve = Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
-        curves.append(Smoothed(curve, window) if window else curve)
-    return curves
+
+    def timed(share: float) -> list[Curve | Smoothed]:
+        accel, most, window = pace.accel * share * arm.max_accel, cap, 0.0
+        if pace.jerk is not None:
+            window = smoothing_window(accel, pace.jerk)
+            most = np.minimum(cap, _smoothing_cap(arm, path, window, pace.tolerance))
+        x = optimal_law(path, Bounds(speed, accel, most), coupled_motors(arm, pace.accel * share))
+        parts = [
+            Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
+            for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)])
+        ]
+        return [Smoothed(curve, window) for curve in parts] if window else list(parts)
+
+    return timed(1.0) if pace.jerk is None else fastest_timing(timed)
 
 
 def _speed_caps(arm: Arm, route: Route, path: Knots, pace: Pace) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 Joint moves are limited in jerk by the seven phases of `profile.py` instead.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,6 +17,7 @@ from armkin.motion.timing.curved_stretch import Curve
 # Gauss-Legendre, four points on [0, 1]: exact for polynomials up to degree 7, and q is of degree 6 in time.
 _X = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263])
 _W = np.array([0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692])
+_NEXT_SHARE, _MOST_SHARES = 0.7, 24  # shares of accelerations that are tried: down to 3e-4
 
 
 def smoothing_window(accel: Array, jerk: ArrayLike) -> float:
@@ -108,6 +109,21 @@ class Smoothed:
             is_inside = [((t >= 0) & (t <= self.curve.duration))[:, None] for t in (end, begin)]
             change = self.curve.evaluate(end, 1) * is_inside[0] - self.curve.evaluate(begin, 1) * is_inside[1]
         return np.asarray(change / self.window)
+
+
+def fastest_timing(timed: Callable[[float], list[Curve | Smoothed]]) -> list[Curve | Smoothed]:
+    """The fastest of the timings that shares of the accelerations give, of ever smaller ones.
+
+    The window is in proportion to the accelerations, and what it allows in a bend to one by its square: with little
+    jerk smaller accelerations are faster. The first share is 1, the search ends where a smaller one is slower.
+    """
+    fastest = timed(1.0)
+    for k in range(1, _MOST_SHARES):
+        curves = timed(_NEXT_SHARE**k)
+        if sum(curve.duration for curve in curves) >= sum(curve.duration for curve in fastest):
+            break
+        fastest = curves
+    return fastest
 
 
 def joint_path(stretch: Curve | Smoothed) -> Knots:
