@@ -14,6 +14,7 @@ from armkin.board.backend.sent_positions import Job
 from armkin.board.grbl.grbl_machine import GrblMachine
 from armkin.board.grbl.motor_axes import axes_of
 from armkin.board.grbl.position_watch import Watch
+from armkin.board.grbl.replies import Report
 from armkin.board.grbl.settings import expected_settings
 from armkin.board.sim.sim_grbl import Grbl
 from armkin.errors import LinkError
@@ -113,6 +114,20 @@ def test_one_damaged_report_is_not_believed() -> None:
     away = report.__class__("Run", 0, (99.0, 0.0, 0.0, 0.0), None, "")
     assert watch.fault(away, 0.1) is None
     assert watch.fault(away, 0.2) == "it has left its path"
+
+
+def test_a_silence_of_a_minute_is_no_fault_of_the_arm_s() -> None:
+    """A computer that is busy, or GRBL: the next report is of a place that the plan has come to meanwhile."""
+    _, machine = open_grbl()
+    job = machine.plan(machine.counts(), np.deg2rad([-60, 60, -60]), speed=0.01)
+    assert isinstance(job, Job)
+    for seconds in (30.0, 60.0, 90.0):
+        watch = Watch(job, machine.axes, np.zeros(3, dtype=np.int64))
+        counts = armkin.pulses(ARM, job.trajectory.q([seconds])[0])
+        place = tuple(count / axis.steps for axis, count in zip(machine.axes, counts, strict=True))
+        report = Report("Run", 0, (*place, 0.0), None, "")
+        assert [watch.fault(report, seconds + late) for late in (0.0, 0.1, 0.2)] == [None] * 3
+        assert "faster" in str([watch.fault(report, seconds - 5.0) for _ in range(2)][-1])
 
 
 def test_settings_are_read_again_before_a_motion() -> None:

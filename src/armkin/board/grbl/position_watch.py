@@ -27,7 +27,7 @@ PATH_DISTANCE = 2.0  # largest distance [steps] of a motor from the path; roundi
 LEAD_TIME = 0.3  # longest time [s] ahead of the plan
 _PROGRESS_TIME = 0.1  # progress [s] in the plan that a moving GRBL makes within _CREEP_TIME
 _CREEP_TIME = 3.0  # [s]
-_WINDOW_POINTS = 250  # points of the path that are compared, 10 s
+_WINDOW_POINTS = 250  # points of the path that are compared, 10 s, and those of a time without reports
 
 
 class Watch:
@@ -58,7 +58,7 @@ class Watch:
         if report.position is None or report.state not in ("Run", "Idle"):
             return None
         steps = np.array([report.position[axis.index] * axis.steps for axis in self._axes])
-        plan_times = self._plan_times(steps - self._offset)
+        plan_times = self._plan_times(steps - self._offset, elapsed)
         fault_text = "it has left its path" if plan_times is None else None
         if plan_times is not None and plan_times[0] > elapsed + LEAD_TIME:
             fault_text = "it is faster than planned"
@@ -77,10 +77,11 @@ class Watch:
         self._pause = max(self._pause, last - first)
         return "it hardly moves on" if elapsed - self._progress_time > _CREEP_TIME + self._pause else None
 
-    def _plan_times(self, counts: Array) -> tuple[float, float] | None:
+    def _plan_times(self, counts: Array, elapsed: float) -> tuple[float, float] | None:
         """First and last time in the plan at which the motors are at these counts; None: off the path."""
         begin = max(self._points_passed - 1, 0)
-        points = self._points[begin : begin + _WINDOW_POINTS + 1]
+        last_point = max(begin, int(np.searchsorted(self._times, elapsed))) + _WINDOW_POINTS
+        points = self._points[begin : last_point + 1]
         if len(points) == 1:
             return (0.0, 0.0) if np.abs(counts - points[0]).max() <= PATH_DISTANCE else None
         travel = np.diff(points, axis=0)
