@@ -143,3 +143,23 @@ def test_settings_are_read_again_before_a_motion() -> None:
     assert machine.prepare(assume=ARM.home)
     machine.run([machine.plan(machine.counts(), np.deg2rad([-3, 85, -85]))])
     assert list(machine.counts()) == port.steps[:3]
+
+
+def test_reports_are_asked_for_while_a_curve_streams() -> None:
+    """Its lines are answered sooner than reports are due: none was asked for until the last line."""
+    port, machine = open_grbl()
+    asked, write = list[float](), port.write
+
+    def listen(data: bytes) -> None:
+        asked.extend([port.now()] * (data == b"?"))
+        write(data)
+
+    port.write = listen  # type: ignore[method-assign]
+    moves = {"start": "home", "moves": [{"point": [390, 80, 300]}, {"line": [390, -80, 300]}]}
+    plan = armkin.path(ARM, moves, tool_speed=10.0)
+    for part in path_run.plan_parts(plan, machine.counts(), machine.plan_trajectory):
+        assert isinstance(part, Job)
+        began = port.now()
+        machine.run([part])
+    assert plan.motion.duration > 15.0
+    assert np.diff([time for time in asked if time >= began]).max() < 0.5

@@ -388,3 +388,14 @@ def test_a_target_whose_changes_nobody_explains_is_sampled_alone_as_in_a_batch(d
     np.testing.assert_array_equal(alone.interval[:count], batch.interval[0, :count])
     assert count == batch.valid[0].sum() > 0
     assert not alone.complete
+
+
+@pytest.mark.parametrize("degrees", [[-90, -90, -90, -176.001, 90, 0, 90], [90, -45, -135, -176.001, -90, 135, 0]])
+def test_an_arm_that_stands_at_a_limit_that_its_family_only_touches_stays(degrees: list[float]) -> None:
+    arm = armkin.load("panda")
+    q = np.deg2rad(degrees)
+    q[3] = arm.lower[3]
+    for solve in (lambda target: ik(arm, target, near=q), lambda target: armkin.compile(arm).ik(target, near=q)):
+        s = solve(armkin.fk(arm, q))
+        assert s.q[s.best].tolist() == q.tolist()
+        assert s.within_limits[s.best]

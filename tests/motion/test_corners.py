@@ -13,7 +13,9 @@ from armkin.board.firmware.segments.trajectory_to_counts import cut_trajectory
 from armkin.errors import NoSolutionError, UsageError
 from armkin.model.arm import Arm
 from armkin.motion.joint_moves import plan_joint_moves
+from armkin.motion.remaining_stretch import remainder
 from armkin.motion.rounded_waypoints import round_waypoints
+from armkin.motors import joints, pulses
 
 _BETWEEN_POINTS = 0.002  # share of a rate that is more between two grid points
 _ROUNDED = 1e-9  # [rad] of a joint value
@@ -117,3 +119,24 @@ def test_waypoints_cost_little_memory_beyond_the_way_itself(three_dof: Arm, monk
         return most
 
     assert peak(300) - peak(100) < 200 * 6000
+
+
+@pytest.mark.parametrize("blend", [0.01, 0.1, 1.0, 5.0])
+def test_rounded_waypoints_with_jerk_are_never_slower_than_stops(three_dof: Arm, blend: float) -> None:
+    arm = replace(three_dof, max_jerk=np.deg2rad([300.0] * 3))
+    rows = np.deg2rad([[10, 80, -80], [12, 60, -82], [-3, 70, -60], [-20, 70, -85], [0, 90, -90]])
+    stops = plan_joint_moves(arm, arm.home, rows)
+    assert round_waypoints(arm, arm.home, rows, blend=blend).duration <= stops.duration
+
+
+@pytest.mark.parametrize("blend", [0.1, 0.5, 1.0])
+def test_what_is_left_of_a_closed_way_goes_on_round_it(three_dof: Arm, blend: float) -> None:
+    """Its end is where it began, to the bit, and it is no pause: the arm went straight there, past all waypoints."""
+    rows = np.deg2rad([[10, 80, -80], [12, 60, -82], [-3, 70, -60], [-20, 70, -85], [0, 90, -90]])
+    [way] = round_waypoints(three_dof, three_dof.home, rows, blend=blend).stretches
+    dense = way.evaluate(np.linspace(0.0, way.duration, 20_001))
+    for begin in np.linspace(0.05, way.duration - 0.1, 5).tolist():
+        present = joints(three_dof, pulses(three_dof, way.evaluate(np.array([begin]))[0]))
+        rest = remainder(three_dof, way, begin, present)
+        left = rest.evaluate(np.linspace(0.0, rest.duration, 200))
+        assert np.rad2deg([np.linalg.norm(dense - q, axis=1).min() for q in left]).max() < 0.05

@@ -210,3 +210,18 @@ def test_with_little_jerk_a_path_takes_little_more_than_the_jerk_asks(three_dof:
     way = float(np.abs(plan.motion.end - plan.motion.start).max())
     least = (32 * way / np.deg2rad(jerk)) ** (1 / 3)  # of a joint from rest to rest, by jerk alone
     assert plan.motion.duration < 2.2 * least
+
+
+@pytest.mark.parametrize("tolerance", [0.05, 0.5, 2.0])
+def test_an_average_over_more_than_a_rounding_stays_within_the_tolerance(three_dof: Arm, tolerance: float) -> None:
+    moves = [{"joint": [0, 60, -80]}, *({"offset": {"xyz": xyz}} for xyz in ([30, 0, 0], [0, 30, 0], [-25, -20, 0]))]
+    plan = armkin.path(three_dof, {"blend": 0.02, "moves": moves}, jerk=np.deg2rad(20.0), tolerance=tolerance)
+    assert plan.deviation <= tolerance
+    corners = armkin.fk(three_dof, np.deg2rad([0.0, 60.0, -80.0]))[:3, 3] + np.cumsum(
+        [[0, 0, 0], [30, 0, 0], [0, 30, 0], [-25, -20, 0]], axis=0
+    )
+    t = np.linspace(plan.motion.stretches[0].duration, plan.motion.duration, 3000)
+    tips = armkin.fk(three_dof, plan.motion.q(t))[:, None, :3, 3]
+    way = np.diff(corners, axis=0)
+    share = np.clip(((tips - corners[:-1]) * way).sum(axis=2) / (way * way).sum(axis=1), 0.0, 1.0)
+    assert np.linalg.norm(tips - corners[:-1] - share[..., None] * way, axis=2).min(axis=1).max() <= tolerance + 0.01

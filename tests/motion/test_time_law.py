@@ -51,3 +51,12 @@ def test_slopes_do_not_depend_on_the_parts_of_a_long_way(monkeypatch: pytest.Mon
     knots = knots_of_samples(s, q, (100, 250))
     monkeypatch.setattr("armkin.motion.timing.speed_bounds._CHUNK_INTERVALS", 37)
     np.testing.assert_array_equal(knots_of_samples(s, q, (100, 250)).d, knots.d)
+
+
+@pytest.mark.parametrize("jerk", [1e9, 1e14, 1e300])
+def test_a_jerk_that_no_board_notices_is_none(jerk: float) -> None:
+    arm = armkin.load("three_dof")
+    q = np.deg2rad(np.linspace([0.0, 90.0, -90.0], [90.0, 60.0, -60.0], 200))
+    free, limited = armkin.time_law(arm, q), armkin.time_law(arm, q, jerk=jerk)
+    assert limited.duration == pytest.approx(free.duration, abs=1e-5)
+    assert np.abs(limited.q([limited.duration])[0] - q[-1]).max() < 1e-9

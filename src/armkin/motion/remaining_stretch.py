@@ -31,7 +31,7 @@ def remainder(arm: Arm, stretch: Stretch, begin: float, present: Array) -> Stret
     slope, which allows u >= 0 wherever the plan itself keeps to the limits.
     """
     time_left = stretch.duration - begin
-    if np.array_equal(stretch.start, stretch.end):
+    if isinstance(stretch, Straight) and np.array_equal(stretch.start, stretch.end):  # a curve may be closed
         if np.array_equal(pulses(arm, present), pulses(arm, stretch.end)):
             return Straight(stretch.end, stretch.end, rest_profile(max(time_left, 0.0)))  # a pause
         return straight_move(arm, present, stretch.end)

@@ -12,11 +12,11 @@ from armkin.formula.arrays import Array
 from armkin.model import units
 from armkin.model.limits import check_limits
 from armkin.motion.branches.branch_path import coupled_motors
-from armkin.motion.joint_moves import check_jerk, check_rates
+from armkin.motion.joint_moves import check_jerk, check_rates, plan_joint_moves
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, share_within, smoothing_window
+from armkin.motion.timing.limit_jerk import share_within, smoothed, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, optimal_law
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -72,7 +72,11 @@ def round_waypoints(
         window = smoothing_window(arm.max_accel * accel, jerk)
     bounds = Bounds(arm.max_speed * speed, arm.max_accel * accel, cap)
     curve = Curve(path, optimal_law(path, bounds, coupled_motors(arm, accel)), len(goals))
-    return Trajectory(arm, first, (Smoothed(curve, window) if window else curve,))
+    rounded = Trajectory(arm, first, (smoothed(curve, window),))
+    if jerk is None:
+        return rounded
+    stopped = plan_joint_moves(arm, first, goals, speed=speed)  # with little jerk, or a small blend, this is faster
+    return min(rounded, stopped, key=lambda trajectory: trajectory.duration)
 
 
 def _rounded_way(corners: Array, blend: float) -> Knots:

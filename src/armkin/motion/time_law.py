@@ -15,7 +15,7 @@ from armkin.motion.joint_moves import check_rates
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothing_window
+from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothed, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, knots_of_samples, optimal_law, refine_knots
 from armkin.motion.timing.trajectory import Trajectory
 
@@ -72,7 +72,7 @@ def time_law(
         limits: Array = arm.max_accel * accel * share
         x = optimal_law(path, Bounds(arm.max_speed * speed, limits, cap), coupled_motors(arm, accel * share))
         curve = Curve(path, x)
-        return [curve if jerk is None else Smoothed(curve, smoothing_window(limits, jerk))]
+        return [curve if jerk is None else smoothed(curve, smoothing_window(limits, jerk))]
 
     return Trajectory(arm, values[0], tuple(timed(1.0) if jerk is None else fastest_timing(timed)))
 

@@ -6,6 +6,7 @@ Lines are sent ahead as long as they fit GRBL's receive buffer (character counti
 
 from __future__ import annotations
 
+import math
 import re
 from collections import deque
 from collections.abc import Callable, Iterable
@@ -59,6 +60,7 @@ class Session:
         self.feed = 100  # [%] last reported feed override
         self.buffer = replies.RX_BUFFER
         self._text, self._heard = "", 0
+        self._time_asked = -math.inf  # [s] when the last status report was asked for
         self._sent: deque[tuple[int, str]] = deque()  # unanswered lines, with their bytes
         self._other_lines: list[str] = []  # other lines received: settings, offsets, messages
 
@@ -189,14 +191,14 @@ class Session:
 
     def _drain(self, max_bytes: int, tick: Callable[[], bool]) -> bool:
         """Wait until at most `max_bytes` are unanswered; False if `tick` asked for a stop."""
-        last_answer = time_asked = self.port.now()
+        last_answer = self.port.now()
         while (waiting_bytes := sum(size for size, _ in self._sent)) > max_bytes:
             if tick():
                 return False
             self._not_reset()
             answers_before, time = self._heard, self.port.now()
-            if time > time_asked + _POLL_PERIOD:
-                time_asked = time
+            if time > self._time_asked + _POLL_PERIOD:  # lines of a curve are answered sooner than this
+                self._time_asked = time
                 self.port.write(replies.STATUS)
             self._pump(0.01)
             if self._heard != answers_before:

@@ -159,7 +159,7 @@ class _Rows:
         """near: (N, n); stands: (N,) it is within limits and solves its target."""
         self.arm, self.joint = arm, joint
         self.near, self.stands = near, stands
-        self.complete, self.short = (np.zeros(len(near), bool) for _ in range(2))
+        self.complete, self.short, self.has_near = (np.zeros(len(near), bool) for _ in range(3))
         none = np.zeros(0, np.intp)
         self.parts: list[tuple[Int, Array, Array, Bool, Int]] = [(none, near[:0], np.zeros((0, 2)), none > 0, none)]
         self.added = 0  # targets
@@ -176,6 +176,7 @@ class _Rows:
             q = curves.without_residual(pieces, q)
         near_rows = np.flatnonzero(self.stands[begin + pieces.row])
         q[near_rows] = _with_near(self.arm, self.joint, rows_of(pieces, near_rows), q[near_rows], near[near_rows])
+        self.has_near[begin + pieces.row[(q == near).all(axis=1)]] = True
         if self.arm.keep_out and not isinstance(curves, Known):
             q = _with_free_postures(self.arm, curves, q, near)
         full_turn = pieces.b - pieces.a > 2 * np.pi - tol.SAME_END
@@ -189,17 +190,20 @@ class _Rows:
     def add_points(self, task: Task, target: Array, search: bool) -> None:
         """Add a posture that solves each target (N, ...) without a piece: near, or, to search, what many starts find.
 
-        All postures of a stretched arm may lie within less than a sample, or be one.
+        All postures of a stretched arm may lie within less than a sample, or be one. Near is added, too, where no legal
+        piece holds it: its family may touch a limit there, and be within the limits nowhere else.
         """
+        for k in np.flatnonzero(self.stands & ~self.has_near).tolist():
+            value = np.full((1, 2), self.near[k, self.joint])
+            self.parts.append((np.array([k]), self.near[[k]], value, np.ones(1, bool), np.zeros(1, np.intp)))
         empty = ~np.isin(np.arange(len(target)), np.concatenate([part[0] for part in self.parts]))
         sought = empty & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
-        for k in np.flatnonzero(empty & (self.stands | sought)).tolist():
-            q, goal = self.near[k][None], target[[k]]
-            if not self.stands[k]:
-                q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
-                q = q[~np.isnan(q[:, 0])]
-                q, miss = newton.correct(self.arm, task, q, np.repeat(goal, len(q), axis=0), SEARCH_STEPS)
-                q = q[miss <= tol.SOLUTION]
+        for k in np.flatnonzero(empty & sought).tolist():
+            goal = target[[k]]
+            q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
+            q = q[~np.isnan(q[:, 0])]
+            q, miss = newton.correct(self.arm, task, q, np.repeat(goal, len(q), axis=0), SEARCH_STEPS)
+            q = q[miss <= tol.SOLUTION]
             if len(q):
                 q, legal = nearest_row(self.arm, q, np.broadcast_to(self.near[k], q.shape))
                 nearest = int(np.lexsort((motion(self.arm, q, self.near[k]), ~legal))[0])

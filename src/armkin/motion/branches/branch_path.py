@@ -27,7 +27,7 @@ from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.timing.cubic_knots import Knots
 from armkin.motion.timing.curved_stretch import Curve
 from armkin.motion.timing.hold_speed_limit import hold_cap
-from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothing_window
+from armkin.motion.timing.limit_jerk import Smoothed, fastest_timing, smoothed, smoothing_window
 from armkin.motion.timing.time_optimal import Bounds, optimal_law, refine_knots
 from armkin.motion.tool_path.route import Route
 from armkin.motors import motor_accel
@@ -235,7 +235,7 @@ def _time_path(arm: Arm, route: Route, path: Knots, pace: Pace) -> list[Curve | 
             Curve(Knots(path.s[a:b], path.q[a:b], path.d[a:b]), x[a:b])
             for a, b in pairwise([0, *(path.rests + 1).tolist(), len(x)])
         ]
-        return [Smoothed(curve, window) for curve in parts] if window else list(parts)
+        return [smoothed(curve, window) for curve in parts]
 
     return timed(1.0) if pace.jerk is None else fastest_timing(timed)
 

@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 def timed_curves(
     arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
 ) -> tuple[list[Curve | Smoothed], Missed]:
-    """A run as timed curves, and its miss of given points: where that is too large, a smaller tolerance is tried."""
+    """A run as timed curves, and its miss of given points: where that is too large, a smaller tolerance is tried.
+
+    So it is where the average that limits the jerk leaves the path too far, as its window covers more than a rounding.
+    """
     if not len(route.given_points[0]):
-        return run_stretches(arm, route, s, run, near, pace, fixed=fixed), None
+        return _curves_on_path(arm, pace, route, s, run, near, fixed), None
     for share in PLAN_SHARES:
         tight_pace = replace(pace, tolerance=share * pace.tolerance)
         curves = run_stretches(arm, route, s, run, near, tight_pace, fixed=fixed)
@@ -40,6 +43,23 @@ def timed_curves(
         f"a given point would lie {largest:.4f} mm off the motion, tolerance {pace.tolerance:g} mm: give a larger "
         "tolerance, or fewer points at a time; nothing was moved",
         deviation_mm=largest,
+        tolerance_mm=pace.tolerance,
+    )
+
+
+def _curves_on_path(
+    arm: Arm, pace: Pace, route: Route, s: Array, run: Run, near: Array, fixed: Array | None
+) -> list[Curve | Smoothed]:
+    """A run as timed curves that stay on their path; arguments as of `timed_curves`."""
+    for share in (1.0, *PLAN_SHARES):
+        curves = run_stretches(arm, route, s, run, near, replace(pace, tolerance=share * pace.tolerance), fixed=fixed)
+        shift = smoothing_shift(arm, curves)
+        if shift <= pace.tolerance:
+            return curves
+    raise NoSolutionError(
+        f"with this jerk the motion would leave its path by {shift:.4f} mm, tolerance {pace.tolerance:g} mm: give a "
+        "larger tolerance or blend, or more jerk; nothing was moved",
+        deviation_mm=shift,
         tolerance_mm=pace.tolerance,
     )
 

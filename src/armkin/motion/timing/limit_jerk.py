@@ -17,6 +17,7 @@ from armkin.motion.timing.curved_stretch import Curve
 # Gauss-Legendre, four points on [0, 1]: exact for polynomials up to degree 7, and q is of degree 6 in time.
 _X = np.array([0.06943184420297371, 0.33000947820757187, 0.6699905217924281, 0.9305681557970263])
 _W = np.array([0.17392742256872692, 0.32607257743127307, 0.32607257743127307, 0.17392742256872692])
+MIN_WINDOW = 1e-5  # least window [s] of an average: a board makes some steps in it
 _NEXT_SHARE, _MOST_SHARES = 0.7, 24  # shares of accelerations that are tried: down to 3e-4
 
 
@@ -33,6 +34,11 @@ def share_within(distance: float, accel: Array, jerk: ArrayLike) -> float:
     """
     farthest = smoothing_window(accel, jerk) ** 2 / 24 * float(np.linalg.norm(accel))
     return float(min(1.0, (distance / farthest) ** (1 / 3)))
+
+
+def smoothed(curve: Curve, window: float) -> "Curve | Smoothed":
+    """The moving average of a curve; the curve itself for a window of which differences of integrals tell nothing."""
+    return Smoothed(curve, window) if window > MIN_WINDOW else curve
 
 
 @dataclass(frozen=True)
