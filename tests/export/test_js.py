@@ -326,6 +326,22 @@ def test_without_a_held_joint_the_module_lists_families(
     assert same >= 0.9 * count
 
 
+def test_an_arm_that_stands_in_a_family_narrower_than_a_sample_stays(tmp_path: Path) -> None:
+    arm = armkin.load("panda")
+    q = np.deg2rad([[118.099, -41.25, 106.335, -24.685, -91.197, 147.857, -10.797]])
+    [answer] = ask_module(arm, tmp_path, q, near=q, targets=armkin.fk(arm, q))["ik"]
+    assert (answer["best"], answer["branches"][0]["joints"]) == (0, q[0].tolist())
+
+
+def test_branches_that_are_one_all_along_are_a_row(tmp_path: Path) -> None:
+    """Links of 200, 300 and 100: about the base the outer two stay folded, whatever the first joint does."""
+    arm = armkin.load("planar_3dof")
+    answers = ask_module(arm, tmp_path, np.zeros((2, 3)), targets=np.array([[0.0, 0.0], [200.0, 100.0]]), task="xy")[
+        "ik"
+    ]
+    assert [len(answer["branches"]) for answer in answers] == [1, 4]
+
+
 def test_surfaces_of_postures_are_counted_by_the_curves_that_they_are_swept_from(tmp_path: Path) -> None:
     """An iiwa7 folded, its wrist in its shoulder, and stretched upwards (`tests/inverse/test_surfaces.py`)."""
     arm = armkin.lock(armkin.load("iiwa7"), {"J7": 0.5})

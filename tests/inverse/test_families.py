@@ -395,7 +395,6 @@ def test_an_arm_that_stands_at_a_limit_that_its_family_only_touches_stays(degree
     arm = armkin.load("panda")
     q = np.deg2rad(degrees)
     q[3] = arm.lower[3]
-    for solve in (lambda target: ik(arm, target, near=q), lambda target: armkin.compile(arm).ik(target, near=q)):
-        s = solve(armkin.fk(arm, q))
+    for s in (ik(arm, armkin.fk(arm, q), near=q), armkin.compile(arm).ik(armkin.fk(arm, q), near=q)):
         assert s.q[s.best].tolist() == q.tolist()
         assert s.within_limits[s.best]

@@ -127,6 +127,14 @@ class Follower {
     return at;
   }
 
+  /** Whether two branches are one posture from end to end. @param {Piece} one @param {Piece} other */
+  areOne(one, other) {
+    if (one.branch === other.branch || Math.abs(one.a - other.a) > STOOD || Math.abs(one.b - other.b) > STOOD) return false;
+    const middle = 0.5 * (one.a + one.b);
+    const q = this.at(other.branch, middle).q;
+    return this.at(one.branch, middle).q.every((x, i) => Math.abs(turned(x - q[i])) < STOOD);
+  }
+
   /** A piece's row, at a value. @param {Piece} piece @param {number} t @returns {Branch} */
   row(piece, t) {
     const node = this.at(piece.branch, t);
@@ -180,7 +188,8 @@ class Follower {
         pieces.push(...this.pieces(b, nodes, gap < 0));
       }
     });
-    return { branches: pieces.map((piece) => this.nearestRow(piece)), long };
+    const distinct = pieces.filter((piece, k) => !pieces.slice(0, k).some((other) => this.areOne(piece, other)));
+    return { branches: distinct.map((piece) => this.nearestRow(piece)), long };
   }
 }
 
@@ -193,17 +202,22 @@ function families(target, near) {
   const follower = new Follower(target, near);
   let { branches, long } = follower.families(SAMPLES);
   if (!branches.length) ({ branches, long } = follower.families(10 * SAMPLES)); // of an all but stretched arm
-  const standing = held(target, near, near[REDUNDANT.joint]).branches.find((row) => row.within_limits && row.motion === 0);
-  const same = branches.reduce((a, b) => (a.motion <= b.motion ? a : b), branches[0]);
-  if (standing && same?.motion < STOOD) Object.assign(same, standing, { family: same.family });
+  const own = held(target, near, near[REDUNDANT.joint]);
+  const standing = own.branches.find((row) => row.within_limits && row.motion === 0);
+  if (standing) {
+    const same = branches.find((row) => row.motion < STOOD);
+    const value = near[REDUNDANT.joint]; // a family narrower than a sample, or one that touches a limit here
+    if (same) Object.assign(same, standing, { family: same.family });
+    else branches.push({ ...standing, family: { joint: names[REDUNDANT.joint], interval: [value, value] } });
+  }
   const moves = (/** @type {Branch} */ row) =>
     row.joints.reduce((sum, x, k) => sum + Math.abs(x - near[k]) * (ARM.slides[k] ? 1 : 180 / Math.PI), 0);
   branches.sort((a, b) => rank(a) - rank(b) || moves(a) - moves(b));
   return {
-    status: branches.length ? (long ? 'exact' : 'boundary') : 'unreachable',
+    status: standing && own.status === 'singular' ? 'singular' : branches.length ? (long ? 'exact' : 'boundary') : 'unreachable',
     complete: false,
     best: branches.length && rank(branches[0]) === 0 ? 0 : null,
-    free_joints: [],
+    free_joints: standing && own.status === 'singular' ? own.free_joints : [],
     closest: branches.some((row) => row.within_limits) ? null : nearestPose(target, near),
     branches,
   };

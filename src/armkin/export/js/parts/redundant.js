@@ -111,7 +111,7 @@ export function ik(target, near = home, value = undefined) {
   const j = REDUNDANT.joint;
   for (const x of actual(near)) if (!Number.isFinite(x)) throw new RangeError('near holds a value that is not finite');
   if (value === undefined && CLOSED_FORM) return families(target, near);
-  const own = value ?? near[j];
+  const own = value === undefined ? near[j] : value;
   if (!Number.isFinite(own)) throw new RangeError(`${names[j]} cannot be held at ${own}: give one finite number`);
   return held(target, near, own);
 }
