@@ -221,6 +221,8 @@ def test_counts_of_one_are_said_so(tmp_path: Path) -> None:
         ("moves: [{wait: abc}]", "move 1: wait: is the text 'abc'; for example wait: 0.5"),
         ("moves: [{grip: half}]", "move 1: grip: is the text 'half'; for example grip: closed"),
         (f"corners: round\n{LINE}", "corners: is the text 'round'; for example corners: stop, corners: blend or"),
+        ("moves:\n  - 5\n", "move 1: is 5; for example moves: [{line: [390, 160, 300]}, {wait: 1}]"),
+        ("moves: home\n", "moves: is the text 'home'; for example moves: [{line:"),
         (f"robot: 5\n{LINE}", "robot: is 5; for example robot: three_dof"),
         ("start: [0, 90, -90]\nmoves: [{wait: 1}]", "start: is a list; for example start: home, start: {joints:"),
         ("start: {}\nmoves: [{wait: 1}]", "start: give joints: or point:, one of them"),
@@ -255,12 +257,18 @@ def test_the_message_is_of_what_was_typed(words: tuple[Any, ...], stdin: bytes, 
     assert says in completed.err
 
 
+def test_quoted_cells_with_blanks_beside_the_comma_are_read() -> None:
+    rows = b'"q1" , "q2", "q3"\n"10" ,"20" , "30"\n'
+    assert run("fk", DOF, "--batch", "-", stdin=rows).out.splitlines()[1].startswith("10.0,20.0,30.0,")
+
+
 @pytest.mark.parametrize(
     ("row", "says"),
     [
         ('{"q1": 1, "q2": 2, "q3": 3, "q1": 9}', "row 1: it has q1 twice"),
         ('{"q1": 1, "q2": 2, "q3": NaN}', "row 1: q3: nan is not finite"),
         ('{"q1": 1, "q2": -Infinity, "q3": 3}', "row 1: q2: -inf is not finite"),
+        (f'{{"q1": 1{"0" * 400}, "q2": 2, "q3": 3}}', "row 1: q1: a number of 401 digits is too large"),
         ("[1, 2, 3]", "row 1: this is no JSON object"),
     ],
 )

@@ -77,3 +77,39 @@ def test_a_joint_may_share_its_name_with_a_measured_coordinate(tmp_path: Path) -
     assert tips.startswith("joint_x,q2,q3,x,y,z,")
     measured.write_text(tips)
     assert run("calibrate", file, measured).code == 0
+
+
+@pytest.mark.parametrize(
+    ("names", "columns"),
+    [
+        (("joint_x", "x", "b"), "joint_x,joint_joint_x,b"),
+        (("x", "X", "b"), "joint_x,joint_joint_X,b"),
+        (("q1", "q2", "q3"), "q1,q2,q3"),
+    ],
+)
+def test_every_joint_has_a_column_of_its_own(names: tuple[str, ...], columns: str, tmp_path: Path) -> None:
+    text = run("export", "three_dof", "--dh").out
+    for old, new in zip(("q1", "q2", "q3"), names, strict=True):
+        text = text.replace(f"name: {old}\n", f"name: {new}\n")
+    file = tmp_path / "named.yaml"
+    file.write_text(text)
+    table = run("fk", file, "--batch", "-", stdin=b"10,20,30\n").out
+    assert table.startswith(f"{columns},x,y,z,")
+    assert run("fk", file, "--batch", "-", stdin=table.encode()).out == table
+
+
+def test_a_column_that_no_table_has_is_not_taken_for_a_joint_s() -> None:
+    rows = b"joint_q1,q1,q2,q3\n99,10,20,30\n"
+    assert run("fk", "three_dof", "--batch", "-", stdin=rows).out.splitlines()[1].startswith("10.0,20.0,30.0,")
+
+
+def test_a_joint_s_column_may_have_its_unit(tmp_path: Path) -> None:
+    file = tmp_path / "named.yaml"
+    file.write_text(run("export", "three_dof", "--dh").out.replace("name: q1\n", "name: x\n"))
+    rows = b"joint_x_deg,q2,q3,x_mm,y_mm,z_mm\n10,20,30,280,49,283\n"
+    assert run("fk", file, "--batch", "-", stdin=rows).out.splitlines()[1].startswith("10.0,20.0,30.0,")
+    trace = tmp_path / "trace.csv"
+    assert run("send", file, 10, 20, 30, "--dry-run", "--trace", trace).code == 0
+    lines = run("ik", file, "--batch", trace).out.splitlines()
+    assert lines[-1].split(",")[1:2] == ["exact"]
+    assert float(lines[-1].split(",")[3]) == pytest.approx(10.0, abs=0.05)  # of either elbow

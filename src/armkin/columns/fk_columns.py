@@ -25,7 +25,7 @@ def pose_columns(arm: Arm, values: Array, T: Array | None = None) -> Table:
     table: Table = _named_columns("xyz", matrices[:, :3, 3])
     table |= _named_columns(("roll", "pitch", "yaw"), units.angles_out(rotation.rpy(matrices[:, :3, :3])))
     table["within_limits"] = np.asarray(~limits.outside_limits(arm, q).any(axis=1))
-    return _named_columns(joint_columns(arm.joint_names, table), values) | table
+    return _named_columns(joint_columns(arm.joint_names), values) | table
 
 
 def pulse_columns(arm: Arm, values: Array, best: bool = False) -> tuple[Table, Bool]:
@@ -44,7 +44,7 @@ def pulse_columns(arm: Arm, values: Array, best: bool = False) -> tuple[Table, B
     within_limits = np.asarray(~limits.outside_limits(arm, q).any(axis=1))
     table["within_limits"] = within_limits
     within_travel = ~motors.outside_travel(arm, rounding.pulses).any(axis=1)
-    return _named_columns(joint_columns(arm.joint_names, table), values) | table, within_limits & within_travel
+    return _named_columns(joint_columns(arm.joint_names), values) | table, within_limits & within_travel
 
 
 def _named_columns(names: Sequence[str], values: NDArray[Any]) -> Table:

@@ -199,7 +199,7 @@ def _branch_table(
     joints = np.ascontiguousarray(units.joints_out(request.arm, lines.q).T)
     within_limits = np.zeros(len(present), bool)
     within_limits[present] = lines.within_limits
-    joint_names = joint_columns(request.arm.joint_names, BRANCH_COLUMNS)
+    joint_names = joint_columns(request.arm.joint_names)
     table |= dict(zip(joint_names, joints, strict=True)) | {"within_limits": within_limits}
     table |= {"residual_mm": distances, "residual_deg": units.angles_out(angles), "motion": lines.motion}
     if all_present:

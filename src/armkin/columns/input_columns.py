@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from armkin.columns import parquet
+from armkin.columns.joint_columns import places_of_columns
 from armkin.errors import FileError, UsageError
 from armkin.formula.arrays import Array
 
@@ -25,22 +26,9 @@ def reader_of(path: str) -> Callable[[str, Sequence[str], bool, int], Iterator[A
     return {".npz": _read_npz, ".parquet": _read_parquet, ".jsonl": _read_json_lines}.get(Path(path).suffix.lower())
 
 
-def column_places(heading: Sequence[str], name: str, of_joint: bool = False) -> list[int]:
-    """Columns of a name: those of exactly this name, or those with a unit behind it.
-
-    of_joint: the name is a joint's, whose column is `joint_x` beside one of another x (`joint_columns`).
-    """
-    if of_joint and f"joint_{name}" in heading:
-        name = f"joint_{name}"
-    exact = [i for i, cell in enumerate(heading) if cell == name]
-    with_units = (f"{name}_mm", f"{name}_deg", f"{name}/mm", f"{name}/deg", f"tool_{name}_mm")
-    return exact or [i for i, cell in enumerate(heading) if cell in with_units]
-
-
 def _wanted_names(path: str, heading: Sequence[str], names: Sequence[str], of_joints: bool) -> list[str]:
     """The file's names of the columns wanted."""
-    lower_heading = [cell.lower() for cell in heading]
-    places_of = {name: column_places(lower_heading, name.lower(), of_joints) for name in names}
+    places_of = places_of_columns(heading, names, of_joints)
     missing_names = [name for name, places_found in places_of.items() if not places_found]
     if missing_names:
         heading_text = ", ".join(heading[:20])
@@ -142,6 +130,15 @@ def _cell_number(path: str, number: int, name: str, value: Any) -> float:
         return np.nan
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise UsageError(f"{path}: row {number}: {name}: {json.dumps(value)[:40]} is no number", row=number)
-    if not np.isfinite(value):
-        raise UsageError(f"{path}: row {number}: {name}: {value} is not finite", row=number)
-    return float(value)
+    try:
+        cell = float(value)
+    except OverflowError:
+        cell = np.inf
+    if not np.isfinite(cell):
+        raise UsageError(
+            f"{path}: row {number}: {name}: {value:.10} is not finite"
+            if isinstance(value, float)
+            else f"{path}: row {number}: {name}: a number of {len(str(value))} digits is too large",
+            row=number,
+        )
+    return cell

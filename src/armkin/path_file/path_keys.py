@@ -43,6 +43,7 @@ EXAMPLES = {
     "blend": "blend: 5",
     "robot": "robot: three_dof",
     "task": "task: xyz",
+    "moves": "moves: [{line: [390, 160, 300]}, {wait: 1}]",
 }
 
 

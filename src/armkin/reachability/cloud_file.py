@@ -49,8 +49,7 @@ def open_cloud(path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iter
 
 @contextmanager
 def _csv_writer(file: IO[bytes], path: str, arm: Arm, count: int, measures: Sequence[str]) -> Iterator[Write]:
-    others = ["x", "y", "z", *measures]
-    heading = [*joint_columns(arm.joint_names, others), *others]
+    heading = [*joint_columns(arm.joint_names), "x", "y", "z", *measures]
     file.write(f"{','.join(heading)}\n".encode())
     row = ",".join(["%.10g"] * len(heading)) + "\n"
 

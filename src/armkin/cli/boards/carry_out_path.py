@@ -176,7 +176,7 @@ def _write_samples(plan: PathPlan, name: str) -> None:
 
     arm = plan.arm
     others = [*(f"{j}_speed" for j in arm.joint_names), "x_mm", "y_mm", "z_mm", "s_mm"]
-    heading = ["time_s", *joint_columns(arm.joint_names, ["time_s", *others]), *others]
+    heading = ["time_s", *joint_columns(arm.joint_names), *others]
     t = np.append(np.arange(0.0, plan.duration, _ROW_PERIOD), plan.duration)
     with output.destination(name) as write:
         write(csv_line(heading) + "\n")

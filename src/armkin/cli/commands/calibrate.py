@@ -66,7 +66,7 @@ def calibrate(
     arm = arguments.load_arm(robot)
     kinds = [kind.strip() for kind in fix.split(",") if kind.strip()] if fix else []
     tip_names = ["x", "y", "z", *(("roll", "pitch", "yaw") if poses else ())]
-    names = [*joint_columns(arm.joint_names, tip_names), *tip_names]
+    names = [*joint_columns(arm.joint_names), *tip_names]
     numbers, rows = _measured_rows(measured, names, arm)
     if suggest is not None:
         _print_suggestions(arm, suggest, rows, kinds, json, out)

@@ -252,7 +252,7 @@ class IkQuestions:
         from armkin.columns.joint_columns import joint_columns
         from armkin.columns.table import table_of_records
 
-        joint_names = joint_columns(self.request.arm.joint_names, BRANCH_COLUMNS)
+        joint_names = joint_columns(self.request.arm.joint_names)
         heading = [*BRANCH_COLUMNS[:3], *joint_names, *BRANCH_COLUMNS[3:]]
         records: list[list[Any]] = []
         has_best: list[bool] = []

@@ -304,7 +304,7 @@ def _write_trace(arm: Arm, plans: Sequence[Planned], path: str | None) -> None:
     if path is None:
         return
     others = [f"{name}_{axis}_mm" for name in [*arm.joint_names, "tool"] for axis in "xyz"]
-    heading = ["time_s", *joint_columns(arm.joint_names, ["time_s", *others]), *others]
+    heading = ["time_s", *joint_columns(arm.joint_names), *others]
     begin_time = 0.0
     with output.destination(path) as write:
         write(csv_line(heading) + "\n")

@@ -17,6 +17,7 @@ from armkin.cli.parsing.number_parsing import MAX_NUMBER, numbers
 from armkin.cli.parsing.row_chunks import CHUNK_ROWS as CHUNK_ROWS
 from armkin.cli.parsing.row_chunks import Chunk
 from armkin.cli.printing import output
+from armkin.columns.joint_columns import places_of_columns
 from armkin.errors import FileError, UsageError
 
 if TYPE_CHECKING:
@@ -105,8 +106,7 @@ class CsvColumns:
 
     def _read_heading(self, cells: list[str]) -> bool:
         """Take a line for a heading if it names one of the columns."""
-        lower_cells = [cell.lower() for cell in cells]
-        places_of = {name: _column_places(lower_cells, name.lower(), self.of_joints) for name in self.names}
+        places_of = places_of_columns(cells, self.names, self.of_joints)
         if not any(places_of.values()):
             self._refuse_another(cells)
             return False
@@ -363,13 +363,8 @@ def _split_cells(text: str) -> list[str]:
     if '"' not in text:
         return [cell.strip() for cell in text.split(",")]
     try:
-        return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True, strict=True))]
+        if text.count('"') % 2 == 0:
+            return [cell.strip() for cell in next(csv.reader([text], skipinitialspace=True))]
     except csv.Error:
-        raise UsageError("this is no CSV of numbers: its quotes do not match; leave quotes out") from None
-
-
-def _column_places(heading: Sequence[str], name: str, of_joint: bool) -> list[int]:
-    """See `armkin.columns.input_columns.column_places`."""
-    from armkin.columns.input_columns import column_places  # imported here, as it needs numpy
-
-    return column_places(heading, name, of_joint)
+        pass
+    raise UsageError("this is no CSV of numbers: its quotes do not match; leave quotes out")
