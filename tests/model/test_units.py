@@ -36,7 +36,7 @@ def test_every_decimal_of_nine_digits_comes_back(digits: int, places: int) -> No
     arm = from_links(np.tile(np.eye(4), (2, 1, 1)), [False], limits=limits)
     if value > 0:
         assert units.limits_out(arm) == [(0.0, value)]
-    assert units.joint_out(arm, 0, float(units.joints_in(arm, [value])[0])) == value
+    assert units.joint_as_typed(arm, 0, float(units.joints_in(arm, [value])[0])) == value
 
 
 def test_a_locked_arm_has_its_own_limits() -> None:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from armkin.errors import NoSolutionError, UsageError
 from armkin.formula.arrays import Array
-from armkin.model.units import DEGREE, finite_or_none, joint_out, limits_out
+from armkin.model.units import DEGREE, finite_or_none, joint_as_typed, limits_out
 
 if TYPE_CHECKING:
     from armkin.model.arm import Arm
@@ -41,7 +41,7 @@ def principal_values(value: Array) -> Array:
 def limit_fields(arm: Arm, joint: int, value: float) -> dict[str, Any]:
     """Fields of an error about a joint outside its limits: joint, value, lower, upper [deg | mm], None if unlimited."""
     lower, upper = map(finite_or_none, limits_out(arm)[joint])
-    return {"joint": arm.joint_names[joint], "value": joint_out(arm, joint, value), "lower": lower, "upper": upper}
+    return {"joint": arm.joint_names[joint], "value": joint_as_typed(arm, joint, value), "lower": lower, "upper": upper}
 
 
 def outside_text(arm: Arm, joint: int, value: float) -> str:

@@ -40,7 +40,7 @@ def joints_out(arm: Arm, q: ArrayLike) -> Array:
     return np.asarray(q, dtype=float) / joint_scale(arm) + 0.0  # + 0.0 turns -0.0 into 0.0
 
 
-def joint_out(arm: Arm, joint: int, value: float) -> float:
+def joint_as_typed(arm: Arm, joint: int, value: float) -> float:
     """One joint value from [rad | mm] to [deg | mm], with the fewest digits that give it: as it was typed."""
     return _shortest_number(float(value), float(joint_scale(arm)[joint]))
 

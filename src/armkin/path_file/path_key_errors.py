@@ -53,8 +53,10 @@ def _place_of(loc: tuple[str | int, ...]) -> Place:
 
 
 def _is_shape(part: str) -> bool:
-    is_number = part.startswith("constrained-")
-    return is_number or any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
+    is_bounded_number = part.startswith("constrained-")
+    return (
+        is_bounded_number or any(sign in part for sign in "[]()") or part in ("float", "str", "int", "Start", "[key]")
+    )
 
 
 def _place_text(place: Place) -> str:

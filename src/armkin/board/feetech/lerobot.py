@@ -17,7 +17,7 @@ import numpy as np
 from armkin.board.feetech import registers
 from armkin.board.feetech.registers import COUNTS_PER_TURN
 from armkin.errors import FileError, LinkError, UsageError
-from armkin.model.units import DEGREE, joint_out, poses_out
+from armkin.model.units import DEGREE, joint_as_typed, poses_out
 
 if TYPE_CHECKING:
     from armkin.board.feetech.feetech_machine import ServoMachine
@@ -127,7 +127,7 @@ def calibration_edits(arm: Arm, path: str, pose: Array | None) -> ServoCalibrati
         counts_per_degree = drive.pulses_per_unit() * (-1 if motor.drive_mode else 1)  # [counts/deg]
         zero_count = motor.middle - counts_per_degree * float(middle[joint]) / DEGREE
         low, high = sorted((count - zero_count) / counts_per_degree for count in (motor.range_min, motor.range_max))
-        _check_poses(arm, joint, joint_out(arm, joint, middle[joint]), (low, high))
+        _check_poses(arm, joint, joint_as_typed(arm, joint, middle[joint]), (low, high))
         motors.append(motor)
         zero.append(zero_count)
         limits.append((low, high))

@@ -1,9 +1,9 @@
 const SAMPLES = 360; // of a turn of the redundant joint
 const SOLVED = 1e-18; // squared residual of a posture that solves a target
-const LEAST = 1e-22; // squared residual: above it a branch is no more, unless it had a ten thousandth of it before
+const LEAST = 1e-22; // squared residual up to which a branch goes on to its end, or ten thousand times that of its last sample
 const HALVINGS = 36; // of a sample's step: to 1e-12 rad
 const SECTIONS = 36; // of the golden section, to 1e-9 rad
-const BEND = 0.15; // rad: where a joint turns more between two nodes, beside a singular posture, there are more of them
+const BEND = 0.15; // [rad] that a joint turns between two samples: beside a singular posture it turns more, and there are more samples
 const DEPTH = 7; // halvings of a step there
 const TURNS = 30; // steps in search of a turning point of the room to the limits
 const CLEAR_STEP = Math.PI / 1800; // between postures of an interval that are asked whether they hit something
@@ -142,7 +142,7 @@ class Follower {
     const shift = node.value - t;
     const interval = piece.whole ? [-Math.PI, Math.PI] : [piece.a + shift, piece.b + shift];
     row.family = { joint: names[REDUNDANT.joint], interval: interval.map((end) => end / this.ratio) };
-    return finish(row, node.value / this.ratio, this.near, node.legal || copyOf(t, this.wanted)[1]);
+    return withRedundant(row, node.value / this.ratio, this.near, node.legal || copyOf(t, this.wanted)[1]);
   }
 
   /** A piece's row: the nearest posture, of those that hit nothing if there is one. @param {Piece} piece @returns {Branch} */
@@ -202,7 +202,7 @@ function families(target, near) {
   const follower = new Follower(target, near);
   let { branches, long } = follower.families(SAMPLES);
   if (!branches.length) ({ branches, long } = follower.families(10 * SAMPLES)); // of an all but stretched arm
-  const own = held(target, near, near[REDUNDANT.joint]);
+  const own = heldAnswer(target, near, near[REDUNDANT.joint]);
   const standing = own.branches.find((row) => row.within_limits && row.motion === 0);
   if (standing) {
     const same = branches.find((row) => row.motion < STOOD);
@@ -223,7 +223,8 @@ function families(target, near) {
   };
 }
 
-/** Asks a cost for its minimum between two values. @param {(t: number) => number} cost @param {number} low @param {number} high
+/** Asks for a cost ever nearer to its minimum between two values; what is least is the cost's to keep.
+ * @param {(t: number) => number} cost @param {number} low @param {number} high
  * @param {number} steps */
 function goldenSection(cost, low, high, steps) {
   let [left, right] = [high - RATIO * (high - low), low + RATIO * (high - low)];
@@ -286,7 +287,7 @@ function nearestPose(target, near) {
   let best = null;
   let least = Infinity;
   const cost = (/** @type {number} */ value) => {
-    const found = held(target, near, value).closest;
+    const found = heldAnswer(target, near, value).closest;
     const size = found ? found.distance_mm ** 2 + (((found.angle_deg * Math.PI) / 180) * 0.25 * ARM.reach) ** 2 : Infinity;
     if (size < least) [best, least] = [found, size];
     return size;

@@ -64,7 +64,7 @@ const rank = (row) => (row.within_limits ? (row.hits?.length ? 1 : 0) : 2);
  * A row of the other joints as one of all, with the redundant one at a value.
  * @param {Branch} row @param {number} value [rad] @param {ArrayLike<number>} near @param {boolean} within whether its limits allow it
  */
-function finish(row, value, near, within) {
+function withRedundant(row, value, near, within) {
   const j = REDUNDANT.joint;
   const [low, high] = limits[j] ?? [null, null];
   row.joints = whole(row.joints, value);
@@ -81,14 +81,14 @@ function finish(row, value, near, within) {
  * All branches that reach a target while the redundant joint is held.
  * @param {Target} target @param {ArrayLike<number>} near @param {number} value where it is held [rad] @returns {Answer}
  */
-function held(target, near, value) {
+function heldAnswer(target, near, value) {
   const j = REDUNDANT.joint;
   for (let k = 0; k < others.length; k++) others[k] = near[k < j ? k : k + 1];
   const answer = OTHERS.ik(moved(target, value * ARM.ratio[j]), others);
   const rows = answer.branches;
   const [low, high] = limits[j] ?? [null, null];
   const within = value >= (low ?? -Infinity) - 1e-9 && value <= (high ?? Infinity) + 1e-9;
-  for (const row of rows) finish(row, value, near, within);
+  for (const row of rows) withRedundant(row, value, near, within);
   if (KEEPS_OUT) rows.sort((/** @type {Branch} */ a, /** @type {Branch} */ b) => rank(a) - rank(b)); // of equal ones the order stays
   answer.best = rows.length && rank(rows[0]) === 0 ? 0 : null;
   if (rows.some((/** @type {Branch} */ row) => row.within_limits)) answer.closest = null;
@@ -103,17 +103,17 @@ function held(target, near, value) {
  * All answers to a target: a row for each legal interval of a family of them, its posture nearest to `near`.
  * @param {Target} target @TARGET@
  * @param {ArrayLike<number>} [near] joint values to stay close to [rad | mm], by default home
- * @param {number} [value] where the redundant joint is held instead [rad]; an arm without a closed form holds it in any case,
+ * @param {number} [held] where the redundant joint is held instead [rad]; an arm without a closed form holds it in any case,
  *   by default where `near` has it
  * @returns {Answer} branches within limits and free of hits first, then by motion from `near`; joints and motion [rad | mm]
  */
-export function ik(target, near = home, value = undefined) {
+export function ik(target, near = home, held = undefined) {
   const j = REDUNDANT.joint;
   for (const x of actual(near)) if (!Number.isFinite(x)) throw new RangeError('near holds a value that is not finite');
-  if (value === undefined && CLOSED_FORM) return families(target, near);
-  const own = value === undefined ? near[j] : value;
-  if (!Number.isFinite(own)) throw new RangeError(`${names[j]} cannot be held at ${own}: give one finite number`);
-  return held(target, near, own);
+  if (held === undefined && CLOSED_FORM) return families(target, near);
+  const value = held === undefined ? near[j] : held;
+  if (!Number.isFinite(value)) throw new RangeError(`${names[j]} cannot be held at ${value}: give one finite number`);
+  return heldAnswer(target, near, value);
 }
 
 /** Names of all branches that a target may have. */
