@@ -11,7 +11,7 @@ from emulator import MCU, EmulatedBoard, build_firmware
 
 from armkin.board_catalogue import BOARDS
 from armkin.flash import firmware_images
-from command_line import run
+from command_line import run, run_patiently
 
 LOADERS = Path("/usr/share/arduino/hardware/arduino/avr/bootloaders")
 KINDS = ("uno_cnc_shield", "mega_ramps14")
@@ -74,13 +74,13 @@ def test_an_empty_board_runs_armkin(
     if uploader == "armkin":
         monkeypatch.setattr("armkin.flash.avrdude.find_avrdude", lambda: None)
     with empty_board(kind) as board:
-        completed = run("flash", "--board", kind, "--port", board.port, "--json")
+        completed = run_patiently("flash", "--board", kind, "--port", board.port, "--json")
         assert completed.code == 0, completed.err
         answer = completed.json
         assert (answer["board"], answer["uploader"], answer["firmware"]) == (kind, uploader, "2.0")
         assert 20_000 < answer["bytes"] < 32_000
         if kind == "uno_cnc_shield":  # and a motor turns: its second command
-            assert run("send", "three_dof", 1, 90, -90, "--port", board.port, "--assume-home").code == 0
+            assert run_patiently("send", "three_dof", 1, 90, -90, "--port", board.port, "--assume-home").code == 0
             assert board.stats()["axes"]["X"]["net"] != 0
 
 
@@ -94,7 +94,7 @@ def test_a_cut_in_the_middle_is_told_and_the_same_command_repeats_it(empty_board
         assert "bytes were written, so that the board has no whole program now" in completed.err
         assert "the same command writes it again" in completed.err
         board.control("restore")
-        assert run(*command, board.port).code == 0
+        assert run_patiently(*command, board.port).code == 0
 
 
 @pytest.mark.parametrize(("named", "plugged_in"), [KINDS, KINDS[::-1]])

@@ -52,7 +52,13 @@ def run(*words: object, stdin: bytes = b"", cwd: Path = ROOT) -> Result:
     return Result(code, out.getvalue(), err.getvalue())
 
 
-BUSY = ("no board answers", "does not answer any more", "too slow or too noisy", "half a second")
+BUSY = (
+    "the boot loader answered nothing",
+    "no board answers",
+    "does not answer any more",
+    "too slow or too noisy",
+    "half a second",
+)
 
 
 def run_patiently(*words: object, run: Callable[..., Result] = run) -> Result:
