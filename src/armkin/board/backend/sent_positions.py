@@ -53,8 +53,12 @@ def is_one_line(stretch: Stretch) -> TypeGuard[Straight]:
 
 def piece_times(stretch: Stretch, piece: float) -> Array:
     """Ends of the pieces [s], of `piece` seconds at most, in which a stretch is sent to such a board."""
-    count = 1 if is_one_line(stretch) else max(int(np.ceil(stretch.duration / piece)), 1)
-    return np.asarray(np.linspace(0.0, stretch.duration, count + 1)[1:])
+    return np.array([stretch.duration]) if is_one_line(stretch) else equal_pieces(stretch.duration, piece)
+
+
+def equal_pieces(duration: float, longest: float) -> Array:
+    """Ends of the fewest equal pieces [s] of a duration, of which none is longer than `longest`; one at least."""
+    return np.asarray(np.linspace(0.0, duration, max(int(np.ceil(duration / longest)), 1) + 1)[1:])
 
 
 def plan_targets(arm: Arm, start: Sequence[int], targets: Array, speed: float) -> tuple[Trajectory, NDArray[np.int64]]:

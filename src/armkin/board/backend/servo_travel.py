@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from armkin.board.backend.sent_positions import equal_pieces
 from armkin.errors import NoSolutionError
 from armkin.model import units
 from armkin.motion.timing.trajectory import Straight
@@ -28,8 +29,9 @@ def first_beyond(trajectory: Trajectory, start: NDArray[np.int64], allowed: NDAr
     """
     low, high = np.minimum(allowed[:, 0], start), np.maximum(allowed[:, 1], start)
     for stretch in trajectory.stretches:
-        count = 1 if isinstance(stretch, Straight) else max(int(np.ceil(stretch.duration / _PERIOD)), 1)
-        goals = pulses(trajectory.arm, stretch.evaluate(np.linspace(0.0, stretch.duration, count + 1)[1:]))
+        is_straight = isinstance(stretch, Straight)
+        times = np.array([stretch.duration]) if is_straight else equal_pieces(stretch.duration, _PERIOD)
+        goals = pulses(trajectory.arm, stretch.evaluate(times))
         for row, motor in np.argwhere((goals < low) | (goals > high))[:1]:
             return int(motor), int(goals[row, motor])
     return None

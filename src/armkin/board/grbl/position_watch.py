@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from armkin.board.backend.sent_positions import is_one_line
+from armkin.board.backend.sent_positions import equal_pieces, is_one_line
 from armkin.board.grbl.trajectory_to_gcode import PIECE_TIME
 from armkin.errors import LinkError
 from armkin.motors import exact_pulses, pulses
@@ -103,7 +103,7 @@ def _path_samples(job: Job) -> tuple[Array, Array]:
     arm = job.trajectory.arm
     times, points = [np.zeros(1)], [np.asarray(job.start, dtype=float)[None]]
     for stretch, start_time in zip(job.trajectory.stretches, job.trajectory.begins, strict=False):
-        t = np.linspace(0.0, stretch.duration, max(int(np.ceil(stretch.duration / PIECE_TIME)), 1) + 1)[1:]
+        t = equal_pieces(stretch.duration, PIECE_TIME)
         q = stretch.evaluate(t)
         times.append(start_time + t)
         points.append(exact_pulses(arm, q) if is_one_line(stretch) else pulses(arm, q).astype(float))

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from armkin.board.backend.sent_positions import equal_pieces
 from armkin.board.klipper.extra_axes import PIECE_TIME, TIME_RATE, Axis
 from armkin.motors import exact_pulses, pulses
 
@@ -89,7 +90,6 @@ def _piece_times(trajectory: Trajectory) -> Array:
     """Ends of the pieces [s]: every stretch in equal ones of PIECE_TIME at most."""
     ends = [np.zeros(0)]
     for stretch, began in zip(trajectory.stretches, trajectory.begins, strict=False):
-        count = max(int(np.ceil(stretch.duration / PIECE_TIME)), 1)
-        ends.append(began + np.linspace(0.0, stretch.duration, count + 1)[1:])
+        ends.append(began + equal_pieces(stretch.duration, PIECE_TIME))
     times = np.concatenate(ends)
     return np.asarray(times[np.append(np.diff(times) > _SHORT_PIECE, np.ones(len(times[:1]), dtype=bool))])

@@ -61,7 +61,8 @@ def jog(
             output.warn(f"the position is lost: {allowed_speed:g} instead of {speed}, and no limits")
         if machine.position() != "lost":  # a simulated board knows it since it got ready
             keep_outs.tell_start_hit(arm, machine.joints())
-            keep_outs.tell_ignored([jog_motion(arm, machine.joints(), j, allowed, time)])
+            if arm.ignores_keep_out:
+                keep_outs.tell_ignored([jog_motion(arm, machine.joints(), j, allowed, time)])
         board.jog(j, allowed, time)
         answer = {**render.head(arm), "port": machine.port.name, **where_arm_stands(machine)}
     with output.destination(None) as write:

@@ -193,12 +193,13 @@ class _Rows:
         All postures of a stretched arm may lie within less than a sample, or be one. Near is added, too, where no legal
         piece holds it: its family may touch a limit there, and be within the limits nowhere else.
         """
-        for k in np.flatnonzero(self.stands & ~self.has_near).tolist():
-            value = np.full((1, 2), self.near[k, self.joint])
-            self.parts.append((np.array([k]), self.near[[k]], value, np.ones(1, bool), np.zeros(1, np.intp)))
+        lone = np.flatnonzero(self.stands & ~self.has_near)
+        q = self.near[lone]
+        value = np.repeat(q[:, [self.joint]], 2, axis=1)
+        self.parts.append((lone, q, value, np.ones(len(lone), bool), np.zeros(len(lone), np.intp)))
         empty = ~np.isin(np.arange(len(target)), np.concatenate([part[0] for part in self.parts]))
-        sought = empty & ~self.stands & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
-        for k in np.flatnonzero(empty & sought).tolist():
+        sought = empty & search & (self.arm.prismatic.any() | (distance(self.arm, task, target) <= 1.0))
+        for k in np.flatnonzero(sought).tolist():
             goal = target[[k]]
             q = newton.many_starts(self.arm, task, goal, np.ones(1, bool))[0]
             q = q[~np.isnan(q[:, 0])]

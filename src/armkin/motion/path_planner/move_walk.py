@@ -18,15 +18,13 @@ from armkin.inverse.tasks.choose_task import task_for
 from armkin.inverse.tasks.task import targets_of
 from armkin.model.limits import check_limits, outside_limits, outside_text
 from armkin.motion.branches.branch_path import Pace, carry_route, starts_at
-from armkin.motion.branches.route_grid import Missed
 from armkin.motion.branches.wrist_window import add_detours
 from armkin.motion.joint_moves import approach_move, straight_move
 from armkin.motion.path_planner import branch_report
 from armkin.motion.path_planner.target_postures import target_postures
-from armkin.motion.path_planner.timed_run import note_deviation, timed_curves
+from armkin.motion.path_planner.timed_run import TimedRun, note_deviation, timed_run
 from armkin.motion.plan.path_plan import Marker, PathPlan, copy_plan
-from armkin.motion.timing.curved_stretch import Curve
-from armkin.motion.timing.limit_jerk import Smoothed, joint_path
+from armkin.motion.timing.limit_jerk import joint_path
 from armkin.motion.timing.profile import rest_profile
 from armkin.motion.timing.trajectory import Straight, Stretch
 from armkin.motion.tool_path import path_numbers
@@ -248,10 +246,10 @@ class Walk:
         s, runs = self._runs(route, near, any_branch=any_branch)
         for number, run in enumerate(runs):
             fixed = self.q if not any_branch and run.first == number == 0 and starts_at(run.chain, self.q) else None
-            curves, misses = timed_curves(self.arm, self.pace, route, s, run, near, fixed)
+            timed = timed_run(self.arm, self.pace, route, s, run, near, fixed)
             if fixed is None:
-                self.append_joint_move(curves[0].start, self.leads if number == 0 else None)
-            self.append_curves(add_detours(route, run.chain.windows), curves, order, misses)
+                self.append_joint_move(timed.curves[0].start, self.leads if number == 0 else None)
+            self.append_run(add_detours(route, run.chain.windows), timed, order)
             near = self.q
         for kind, value in self.pauses.get(len(self.pieces), ()):
             self.emit_event(kind, value)
@@ -271,20 +269,18 @@ class Walk:
             raise branch_report.path_refusal(self.plan, carried_route, branch)
         return carried_route.columns.s, carried_route.moving_runs
 
-    def append_curves(
-        self, route: Route, curves: list[Curve | Smoothed], number_of_curve: dict[int, int], misses: Missed
-    ) -> None:
-        """Append a run's curves to the plan, with the events at their beginnings; misses: of the given points."""
+    def append_run(self, route: Route, timed: TimedRun, number_of_curve: dict[int, int]) -> None:
+        """Append a run's curves to the plan, with the events at their beginnings."""
         begins = {k: round(float(route.ends[number_of_curve[k]]), 6) for k in self.pauses if k in number_of_curve}
         events = {begin: self.pauses[k] for k, begin in begins.items()}
-        for curve in curves:
+        for curve in timed.curves:
             knots = joint_path(curve)
             for kind, value in events.pop(round(float(knots.s[0]), 6), ()):
                 self.emit_event(kind, value)
             self.plan.note_stretch(len(self.stretches), curve, self.plan.length)
             self.stretches.append(curve)
             self.q = curve.end
-        note_deviation(self.plan, route, curves, misses)
+        note_deviation(self.plan, route, timed)
 
     def append_joint_move(self, goal: Array, move: Move | None) -> None:
         """A joint move to joint values."""
