@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 from random import Random
 from typing import Any, NamedTuple
@@ -38,6 +39,10 @@ class Cluster:
         self.scheduler = _start_dask("scheduler", "--host", "127.0.0.1", "--port", "0", *common)
         self.nanny = _start_dask("worker", *common, "--nworkers", str(workers), "--nthreads", "1")
         wait_until(lambda: self.file.exists() and self.file.stat().st_size > 0)
+        # a nanny whose worker is killed before it has come up starts no other, and ends
+        distributed: Any = import_module("distributed")
+        with distributed.Client(self.address, timeout=PATIENCE, set_as_default=False) as client:
+            client.wait_for_workers(workers, timeout=PATIENCE)
 
     @property
     def address(self) -> str:
